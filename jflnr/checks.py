@@ -1,0 +1,49 @@
+"""Argument checks shared by the package: one clear sentence, naming the argument and its value.
+
+They look at static facts only (shapes, types, plain numbers), so they also run while JAX traces.
+"""
+
+import math
+from collections.abc import Collection
+from typing import Any
+
+
+def choice(name: str, value: object, options: Collection[object]) -> None:
+    """Raise ValueError unless `value` is one of `options`."""
+    if value not in options:
+        listed = ", ".join(str(option) for option in options)
+        raise ValueError(f"{name} must be one of {listed}; got {value!r}")
+
+
+def positive(name: str, value: float) -> None:
+    """Raise ValueError unless `value` is a finite number above 0."""
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{name} must be a finite number above 0; got {value!r}")
+
+
+def positive_integer(name: str, value: object) -> None:
+    """Raise TypeError unless `value` is a whole number, ValueError unless it is at least 1."""
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise TypeError(f"{name} must be a whole number; got {value!r}")
+    if value.__index__() < 1:
+        raise ValueError(f"{name} must be at least 1; got {value!r}")
+
+
+def image(name: str, array: Any, channels: int | None = None) -> None:
+    """Raise ValueError unless `array` is (H, W, C) with H, W >= 1 and, if given, C = `channels`."""
+    shape = getattr(array, "shape", None)
+    if shape is None or len(shape) != 3:
+        found = f"shape {shape}" if shape is not None else type(array).__name__
+        raise ValueError(f"{name} must be an array of shape (H, W, C); got {found}")
+    if 0 in shape[:2]:
+        raise ValueError(f"{name} has zero size: its shape is {shape}")
+    if channels is not None and shape[2] != channels:
+        raise ValueError(f"{name} must have {channels} channels; its shape is {shape}")
+
+
+def same_size(**images: Any) -> None:
+    """Raise ValueError unless all (H, W, C) arrays that are not None share H and W."""
+    sizes = {name: array.shape[:2] for name, array in images.items() if array is not None}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{name} is {w} x {h}" for name, (h, w) in sizes.items())
+        raise ValueError(f"Images must be of one size (width x height): {listed}")

@@ -1,0 +1,91 @@
+"""Upsampling of the coefficients and evaluation of the model (section 3.2, kernel 4)."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+
+def apply(coefficients: jax.Array, guides: jax.Array, shift: jax.Array, block: int) -> jax.Array:
+    """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
+
+    The coefficients at pixel p are those at block coordinate `(p + 0.5)/block - 0.5`, clamped
+    (section 3.2). They are never materialised at full resolution. A guide that is not finite
+    counts as being at `shift`.
+
+    coefficients: `(Q + 1, C, h, w)`, from `solve`. guides: `(H, W, Q)`. shift: `(Q,)`.
+    Returns `(H, W, C)`.
+    """
+    height = guides.shape[0]
+    rows = height // block
+    above, below = _neighbours(coefficients, axis=2)
+    grids = [jnp.moveaxis(grid, 2, 0) for grid in (above, coefficients, below)]
+
+    def strip(arrays: tuple[jax.Array, ...]) -> jax.Array:
+        return _apply_strip(*arrays, shift=shift, block=block)
+
+    whole = guides[: rows * block].reshape(rows, block, *guides.shape[1:])
+    image = lax.map(strip, (whole, *(grid[:rows] for grid in grids)))
+    image = image.reshape(rows * block, *image.shape[2:])
+    if height % block:
+        rest = strip((guides[rows * block :], *(grid[rows] for grid in grids)))
+        image = jnp.concatenate([image, rest])
+    return image
+
+
+def _apply_strip(
+    guides: jax.Array,
+    above: jax.Array,
+    here: jax.Array,
+    below: jax.Array,
+    *,
+    shift: jax.Array,
+    block: int,
+) -> jax.Array:
+    """One row of blocks: guides `(rows, W, Q)` and three rows of models `(Q + 1, C, w)`."""
+    rows, width = guides.shape[:2]
+    before, centre, after = (jnp.asarray(f, here.dtype) for f in _hat(block))
+    vertical = (
+        before[:rows, None] * above[:, :, None]
+        + centre[:rows, None] * here[:, :, None]
+        + after[:rows, None] * below[:, :, None]
+    )
+    # Barriers: at low resolution these are cheap to store and dear to compute once per pixel.
+    vertical = lax.optimization_barrier(vertical)
+    left, right = lax.optimization_barrier(_neighbours(vertical, axis=3))
+
+    def at_pixels(i: int, c: int) -> jax.Array:
+        value = (
+            left[i, c, ..., None] * before
+            + vertical[i, c, ..., None] * centre
+            + right[i, c, ..., None] * after
+        )
+        return value.reshape(rows, -1)[:, :width]
+
+    channels = []
+    for c in range(here.shape[1]):
+        total = at_pixels(0, c)
+        for q in range(shift.size):
+            guide = guides[..., q].astype(here.dtype) - shift[q]
+            total += jnp.where(jnp.isfinite(guide), guide, 0) * at_pixels(q + 1, c)
+        channels.append(total)
+    return jnp.stack(channels, axis=-1)
+
+
+def _hat(block: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bilinear weights of the block before, the block itself and the one after, `(block,)` each."""
+    position = (np.arange(block) + 0.5) / block - 0.5
+    before, after = np.maximum(-position, 0), np.maximum(position, 0)
+    return before, 1 - before - after, after
+
+
+def _neighbours(grid: jax.Array, axis: int) -> tuple[jax.Array, jax.Array]:
+    """The grid moved by one block either way, its border repeated."""
+    size = grid.shape[axis]
+    first = lax.slice_in_dim(grid, 0, 1, axis=axis)
+    last = lax.slice_in_dim(grid, size - 1, size, axis=axis)
+    before = jnp.concatenate([first, lax.slice_in_dim(grid, 0, size - 1, axis=axis)], axis)
+    after = jnp.concatenate([lax.slice_in_dim(grid, 1, size, axis=axis), last], axis)
+    return before, after

@@ -1,0 +1,89 @@
+"""The three learned numbers of Fast Local Regression, and the small file they are kept in."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+FORMAT = "jflnr-parameters"
+VERSION = 1
+
+
+class Parameters(NamedTuple):
+    """Window width and regularisation of FLR, kept as logarithms.
+
+    An optimiser may move the three scalars anywhere: every real value is a valid model.
+
+    log_sigma: log of the Gaussian window's standard deviation, in pixels of the output.
+    log_eps: log of the multiplicative regularisation (Appendix, Eq. 18).
+    log_eps_prime: log of the additive regularisation (Appendix, Eq. 18 and 22).
+    """
+
+    log_sigma: jax.Array | float
+    log_eps: jax.Array | float
+    log_eps_prime: jax.Array | float
+
+    @classmethod
+    def of(cls, sigma: float, eps: float, eps_prime: float) -> Parameters:
+        """Parameters from the numbers themselves; `ValueError` unless all are positive."""
+        values = {"sigma": sigma, "eps": eps, "eps_prime": eps_prime}
+        for name, value in values.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} is {value}; it must be a positive number")
+        return cls(*(math.log(value) for value in values.values()))
+
+    @property
+    def sigma(self) -> jax.Array:
+        return jnp.exp(self.log_sigma)
+
+    @property
+    def eps(self) -> jax.Array:
+        return jnp.exp(self.log_eps)
+
+    @property
+    def eps_prime(self) -> jax.Array:
+        return jnp.exp(self.log_eps_prime)
+
+
+# Fitted on the training frames at 1 spp: `jflnr fit`, see docs/method.md.
+DEFAULT = Parameters.of(sigma=16.0, eps=1e-3, eps_prime=1e-4)
+
+
+def save_parameters(path: str | Path, parameters: Parameters, **about: Any) -> None:
+    """Write the parameters as JSON, with anything else worth knowing about the fit."""
+    from jflnr.files import write_atomically
+
+    text = {
+        "format": FORMAT,
+        "version": VERSION,
+        "sigma": float(parameters.sigma),
+        "eps": float(parameters.eps),
+        "eps_prime": float(parameters.eps_prime),
+        **about,
+    }
+    write_atomically(path, (json.dumps(text, indent=2) + "\n").encode())
+
+
+def load_parameters(path: str | Path) -> tuple[Parameters, dict[str, Any]]:
+    """Parameters and the rest of the file; `ValueError` if it is not such a file."""
+    wanted = f"a JSON file that `jflnr fit` wrote (format {FORMAT!r}, version {VERSION})"
+    try:
+        text = json.loads(Path(path).read_bytes())
+    except FileNotFoundError:
+        raise ValueError(f"{path}: there is no such file; --params wants {wanted}") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read ({error}); it should be {wanted}") from None
+    if not isinstance(text, dict) or text.get("format") != FORMAT or text.get("version") != VERSION:
+        raise ValueError(f"{path}: not a parameter file; it should be {wanted}")
+    try:
+        values = {name: float(text[name]) for name in ("sigma", "eps", "eps_prime")}
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(
+            f"{path}: sigma, eps and eps_prime must all be there as numbers; it should be {wanted}"
+        ) from None
+    return Parameters.of(**values), text
