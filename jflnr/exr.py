@@ -1,0 +1,214 @@
+"""EXR files as a flat dictionary of channels, and back.
+
+Layers are split at the last dot (`albedo.R` is channel R of layer `albedo`). A channel of a
+multi-part file keeps its name when that holds a layer; otherwise its part's name is the layer.
+Whatever is wrong with a file is raised as OSError or ValueError, in one sentence.
+"""
+
+import contextlib
+import io
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import OpenEXR
+
+from jflnr.files import replacing
+
+PathLike = str | os.PathLike[str]
+
+MAGIC = b"\x76\x2f\x31\x01"
+# A small damaged header can announce any size. No real frame packs better than this.
+ALWAYS_ALLOWED_BYTES = 1 << 30
+PACKED_AT_MOST = 1000
+
+
+class Window(NamedTuple):
+    """Where an image lies: its first pixel, and the display window (x0, y0, x1, y1), inclusive."""
+
+    origin: tuple[int, int] = (0, 0)
+    display: tuple[int, int, int, int] | None = None
+
+
+class Attributes(NamedTuple):
+    """What the header says besides the pixels."""
+
+    comments: str
+    compression: str
+    parts: int
+    window: Window
+
+
+def layer_of(channel: str) -> str:
+    """The layer of a channel name, split at the last dot; "" for a plain `R`, `G`, `B`."""
+    return channel.rpartition(".")[0]
+
+
+def layers_of(channels: Mapping[str, Any]) -> dict[str, list[str]]:
+    """The components of each layer, in the file's order: {"normal": ["X", "Y", "Z"]}."""
+    layers: dict[str, list[str]] = {}
+    for name in channels:
+        layers.setdefault(layer_of(name), []).append(name.rpartition(".")[2])
+    return layers
+
+
+def read_attributes(path: PathLike) -> Attributes:
+    """Comments, compression and windows of the file's first part, without its pixels."""
+    parts = _read_parts(Path(path), header_only=True)
+    header = parts[0].header
+    (x0, y0), _ = header["dataWindow"]
+    low, high = header["displayWindow"]
+    return Attributes(
+        comments=str(header.get("comments", "")),
+        compression=header["compression"].name.removesuffix("_COMPRESSION"),
+        parts=len(parts),
+        window=Window((int(x0), int(y0)), (int(low[0]), int(low[1]), int(high[0]), int(high[1]))),
+    )
+
+
+def read_channels(path: PathLike) -> dict[str, np.ndarray]:
+    """Every channel of every part, (H, W), in its own type (float16, float32 or uint32).
+
+    Raises OSError when there is no such file, ValueError when it cannot be used.
+    """
+    path = Path(path)
+    announced = _read_parts(path, header_only=True)
+    for part in announced:
+        _check_header(path, part)
+    parts = _read_parts(path, header_only=False)
+    if len(parts) != len(announced):
+        raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
+    channels: dict[str, np.ndarray] = {}
+    for part in parts:
+        for name, pixels in part.channels.items():
+            layered = "." in name or len(parts) == 1
+            channels[name if layered and name not in channels else f"{part.name}.{name}"] = pixels
+    _check_sizes(path, channels)
+    return channels
+
+
+def write_channels(
+    path: PathLike,
+    channels: Mapping[str, np.ndarray],
+    comments: str | None = None,
+    window: Window | None = None,
+) -> None:
+    """Write (H, W) channels of float16, float32 or uint32 as one part, atomically.
+
+    `window` places the image; without it, it starts at 0, 0 and fills the display window.
+    """
+    path = Path(path)
+    _check_sizes(path, channels)
+    height, width = next(iter(channels.values())).shape
+    (x, y), display = window or Window()
+    corners = (x, y, x + width - 1, y + height - 1)
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "dataWindow": _box(corners),
+        "displayWindow": _box(display or corners),
+    }
+    if comments is not None:
+        header["comments"] = comments
+    contiguous = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
+    try:
+        with replacing(path) as beside, _silence():
+            OpenEXR.File(header, contiguous).write(str(beside))
+    except (OSError, RuntimeError) as error:  # OpenEXR raises RuntimeError when the disk is full
+        raise OSError(f"{path} cannot be written: {getattr(error, 'strerror', error)}") from None
+
+
+class _Part(NamedTuple):
+    name: str
+    header: dict[str, Any]
+    channels: dict[str, np.ndarray]
+
+
+def _read_parts(path: Path, header_only: bool) -> list[_Part]:
+    """The parts that OpenEXR could read. It leaves out those whose pixels are damaged."""
+    _check_file(path)
+    with _silence():
+        try:
+            file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+            return [
+                _Part(
+                    part.name(),
+                    file.header(index),
+                    {channel.name: channel.pixels for channel in part.channels.values()},
+                )
+                for index, part in enumerate(file.parts)
+            ]
+        except Exception as error:  # RuntimeError, UnicodeDecodeError, TypeError, MemoryError, ...
+            raise ValueError(_why_unreadable(path)) from error
+
+
+def _check_file(path: Path) -> None:
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such file")
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder, not an EXR file")
+    try:
+        start = path.open("rb").read(len(MAGIC))
+    except OSError as error:
+        raise OSError(f"{path} cannot be read: {error.strerror}.") from None
+    if not start:
+        raise ValueError(f"{path} is empty (0 bytes), not an EXR file")
+    if start != MAGIC:
+        raise ValueError(f"{path} is not an EXR file")
+
+
+def _why_unreadable(path: Path) -> str:
+    """OpenEXR only says that it could not open the file. The usual reasons can be told apart."""
+    key = b"dataWindow\0box2i\0\x10\0\0\0"
+    _, found, after = path.read_bytes()[: 1 << 16].partition(key)
+    if found and len(after) >= 16:
+        x0, y0, x1, y1 = struct.unpack("<4i", after[:16])
+        if x1 < x0 or y1 < y0:
+            return f"{path} has zero size: its data window is {x0}, {y0} to {x1}, {y1}"
+    return f"{path} is a truncated or damaged EXR file: its header cannot be read"
+
+
+def _check_header(path: Path, part: _Part) -> None:
+    """Refuse, before any memory is asked for, what cannot be an image of a renderer."""
+    if part.header["type"] in (OpenEXR.deepscanline, OpenEXR.deeptile):
+        raise ValueError(f"{path} holds deep pixels; flatten it first")
+    (x0, y0), (x1, y1) = part.header["dataWindow"]
+    width, height = int(x1) - int(x0) + 1, int(y1) - int(y0) + 1
+    channels = len(part.header["channels"])
+    size = path.stat().st_size
+    if 4 * width * height * channels > max(ALWAYS_ALLOWED_BYTES, PACKED_AT_MOST * size):
+        raise ValueError(
+            f"{path} is damaged: its header announces {width} x {height} pixels of {channels} "
+            f"channels, which its {size} bytes cannot hold"
+        )
+
+
+def _check_sizes(path: Path, channels: Mapping[str, np.ndarray]) -> None:
+    sizes = {pixels.shape: name for name, pixels in channels.items()}
+    if not sizes or any(0 in size for size in sizes):
+        raise ValueError(f"{path} has zero size: there are no pixels in it")
+    if len(sizes) > 1:
+        listed = ", ".join(f"{name} is {w} x {h}" for (h, w), name in sizes.items())
+        raise ValueError(f"{path}: sizes disagree (width x height): {listed}")
+
+
+def _box(corners: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Keep OpenEXR's own remarks off the terminal: it prints to stdout and, from C, to stderr."""
+    saved = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(nowhere)

@@ -1,0 +1,84 @@
+"""One rendered frame: noisy indirect light, noise-free guides, and what puts the picture together.
+
+Layers and their meaning are DESIGN.md's ("The frame").
+"""
+
+import json
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import jax
+import numpy as np
+
+from jflnr import checks, exr, layouts
+
+Array: TypeAlias = np.ndarray | jax.Array
+
+HALF_MAX = float(np.finfo(np.float16).max)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Frame:
+    """The layers of one frame, each (H, W, C) float32 or None; a pytree.
+
+    Light is demodulated: multiplied by `albedo` it is reflected radiance.
+    """
+
+    indirect: Array  # (H, W, 3) noisy indirect light
+    albedo: Array  # (H, W, 3) diffuse reflectance, linear
+    normal: Array  # (H, W, 3) world space, unit, turned to the camera; 0 where nothing is hit
+    depth: Array  # (H, W, 1) along the view axis, scene units; 0 where nothing is hit
+    position: Array | None = None  # (H, W, 3) world space
+    ao: Array | None = None  # (H, W, 1) share of free rays
+    mask: Array | None = None  # (H, W, 1) 1 where there is a surface to denoise
+    emission: Array | None = None  # (H, W, 3) light that the surface itself emits, or the sky
+    direct: Array | None = None  # (H, W, 3) converged direct light
+    reference: Array | None = None  # (H, W, 3) converged indirect light
+    reference_a: Array | None = None  # (H, W, 3) mean of the first half of its samples
+    motion: Array | None = None  # (H, W, 2) pixels to where this point was one frame ago
+
+
+def read_frame(path: exr.PathLike, spp: int = 1) -> Frame:
+    """Read the frame at `path` with its noisy layer `indirect_{spp}`.
+
+    Raises OSError for a file that cannot be opened, and ValueError, in one sentence, for one that
+    is not a usable frame.
+    """
+    checks.positive_integer("spp", spp)
+    channels = exr.read_channels(path)
+    return Frame(**layouts.assemble(channels, layouts.native(spp), str(path)))  # type: ignore[arg-type]
+
+
+def read_header(path: exr.PathLike) -> dict:
+    """The JSON object in the header's `comments` (scene, camera, ...); {} if there is none."""
+    try:
+        header = json.loads(exr.read_attributes(path).comments)
+    except json.JSONDecodeError:
+        return {}
+    return header if isinstance(header, dict) else {}
+
+
+def write_frame(path: exr.PathLike, frame: Frame, spp: int = 1, header: dict | None = None) -> None:
+    """Write `frame` in the native layout, its noisy layer as `indirect_{spp}`, atomically.
+
+    Depth is stored as float, the rest as half, unless a layer has values that half cannot hold.
+    """
+    channels: dict[str, np.ndarray] = {}
+    for layer, names in layouts.native(spp).items():
+        if (image := getattr(frame, layer)) is not None:
+            checks.image(layer, image, len(names))
+            pixels = np.asarray(image, np.float32)
+            large = np.abs(pixels[np.isfinite(pixels)]).max(initial=0) > HALF_MAX
+            stored = pixels if layer == "depth" or large else pixels.astype(np.float16)
+            channels.update({name: stored[..., i] for i, name in enumerate(names)})
+    exr.write_channels(path, channels, None if header is None else json.dumps(header))
+
+
+def composite(frame: Frame, indirect: Array) -> Array:
+    """The picture `albedo * (direct + indirect) + emission`, (H, W, 3); an absent layer is 0."""
+    checks.image("indirect", indirect, 3)
+    checks.same_size(albedo=frame.albedo, indirect=indirect)
+    light = indirect if frame.direct is None else frame.direct + indirect
+    picture = frame.albedo * light
+    return picture if frame.emission is None else picture + frame.emission
