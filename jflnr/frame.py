@@ -82,3 +82,10 @@ def composite(frame: Frame, indirect: Array) -> Array:
     light = indirect if frame.direct is None else frame.direct + indirect
     picture = frame.albedo * light
     return picture if frame.emission is None else picture + frame.emission
+
+
+def not_finite(frame: Frame) -> dict[str, int]:
+    """How many pixels of each layer hold a NaN or an infinity, for the layers that have any."""
+    layers = {name: image for name, image in vars(frame).items() if image is not None}
+    counts = {n: int((~np.isfinite(image).all(axis=-1)).sum()) for n, image in layers.items()}
+    return {name: count for name, count in counts.items() if count}

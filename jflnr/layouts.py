@@ -48,36 +48,40 @@ def assemble(
 ) -> dict[str, np.ndarray | None]:
     """The Frame's layers as float32 (H, W, C), None for an optional one that is absent.
 
-    Raises ValueError, naming `source`, for a required layer that is missing, a layer that lacks a
-    channel, and a layer without one finite value.
+    Raises ValueError, naming `source`, as `layer` does.
     """
-    layers: dict[str, np.ndarray | None] = {}
-    for layer, names in layout.items():
-        missing = [name for name in names if name not in channels]
-        if missing == list(names) and layer not in REQUIRED:
-            layers[layer] = None
-            continue
-        if missing:
-            raise ValueError(_missing(channels, layer, names, missing, source))
-        image = np.stack([channels[name].astype(np.float32) for name in names], axis=-1)
-        if not np.isfinite(image).any():
-            raise ValueError(f"{source}: layer {layer_of(names[0])} is NaN or infinite everywhere")
-        layers[layer] = image
-    return layers
+    return {
+        name: layer(channels, name, names, source)
+        if name in REQUIRED or any(channel in channels for channel in names)
+        else None
+        for name, names in layout.items()
+    }
 
 
-def _missing(
-    channels: Mapping[str, np.ndarray],
-    layer: str,
-    names: tuple[str, ...],
-    missing: list[str],
-    source: str,
-) -> str:
+def layer(
+    channels: Mapping[str, np.ndarray], name: str, names: tuple[str, ...], source: str
+) -> np.ndarray:
+    """Layer `name` of a Frame, float32 (H, W, C), from the channels `names`.
+
+    Raises ValueError, naming `source`, if channels are missing or no value is finite.
+    """
     stem = layer_of(names[0])
-    if len(missing) < len(names):
-        return f"{source}: layer {stem} lacks its channel {', '.join(missing)}"
-    if layer == "indirect" and (counts := spp_present(channels)):
-        present = ", ".join(map(str, counts))
-        return f"{source}: layer {stem} is missing; there is indirect light for spp {present}"
-    present = ", ".join(name or "plain R, G, B" for name in layers_of(channels))
-    return f"{source}: layer {stem} is missing; the file holds {present}"
+    missing = [channel for channel in names if channel not in channels]
+    if missing == list(names):
+        raise ValueError(f"{source}: layer {stem} is missing; {_present(channels, name)}")
+    if missing:
+        raise ValueError(f"{source}: layer {stem} lacks its channel {', '.join(missing)}")
+    image = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
+    if not np.isfinite(image).any():
+        raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
+    return image
+
+
+def _present(channels: Mapping[str, np.ndarray], wanted: str) -> str:
+    counts = spp_present(channels)
+    if wanted == "indirect" and counts:
+        return f"there is indirect light for spp {', '.join(map(str, counts))}"
+    present = ", ".join(
+        name or "plain " + "".join(parts) for name, parts in layers_of(channels).items()
+    )
+    return f"the file holds {present}"

@@ -1,0 +1,67 @@
+"""The command `jflnr`: one file per subcommand.
+
+Exit codes: 0 done, 2 something is wrong with what was asked or given, 130 interrupted. Modules here
+import numerical code inside the functions that run it, so that `--help` and `info` answer at once.
+"""
+
+import argparse
+import importlib.metadata
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from jflnr.cli import denoise, fit, info, metrics
+from jflnr.cli.common import INPUT_ERRORS, sentence
+
+COMMANDS = {"denoise": denoise, "info": info, "metrics": metrics, "fit": fit}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command line (default: the process's own) and return its exit code."""
+    arguments = _parser().parse_args(argv)
+    try:
+        code = arguments.run(arguments)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        print("jflnr: interrupted; no partial file is left", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # `jflnr info ... | head`; Python would complain again while exiting
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except INPUT_ERRORS as error:
+        print(f"jflnr: {sentence(error)}", file=sys.stderr)
+        return 2
+
+
+class _Parser(argparse.ArgumentParser):
+    """An ArgumentParser that answers a wrong command line with one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="jflnr", description="Denoise path-traced global illumination.")
+    parser.add_argument("--version", action="version", version=_version())
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, module in COMMANDS.items():
+        summary = (module.__doc__ or "").partition("\n")[0].partition(": ")[2]
+        command = commands.add_parser(
+            name,
+            help=summary,
+            description=(module.__doc__ or "").partition(": ")[2],
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    return parser
+
+
+def _version() -> str:
+    try:
+        return importlib.metadata.version("jflnr")
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown (not installed)"

@@ -1,0 +1,65 @@
+"""What several commands share: how errors read, how numbers are shown."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+# What the library raises for wrong input. Anything else is a defect and keeps its traceback.
+INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
+
+LABELS = {
+    "psnr": "PSNR dB",
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "rmse": "rMSE",
+    "smape": "SMAPE",
+    "mse": "MSE",
+    "mse_unbiased": "MSE unbiased",
+}
+
+
+def sentence(error: BaseException) -> str:
+    """The message of an input error, as one line."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def guide_names(text: str) -> tuple[str, ...]:
+    """`normal,depth,ao` as a tuple; an empty text is no guides."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def to_json(value: Any) -> str:
+    """JSON text, with null for what JSON has no number for (NaN and infinities)."""
+    return json.dumps(_finite(value), indent=2)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def table(rows: Sequence[Sequence[str]], left: int = 1) -> str:
+    """Rows of cells as aligned columns, the first `left` of them to the left."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if i < left else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    )
+
+
+def metrics_table(measured: Mapping[str, Mapping[str, float | None]]) -> str:
+    """One row of metrics per image, `-` for one that could not be taken."""
+    names = list(next(iter(measured.values())))
+    rows = [["", *(LABELS[name] for name in names)]]
+    for image, values in measured.items():
+        rows.append([image, *("-" if values[n] is None else f"{values[n]:.4g}" for n in names)])
+    return table(rows)

@@ -1,0 +1,187 @@
+"""denoise: denoise frames, and write the light and the picture as EXR.
+
+Each output holds the layer `indirect` (denoised, demodulated) and the picture
+albedo * (direct + indirect) + emission as plain R, G, B, all float.
+
+OUT is a file when IN is one file and OUT ends with .exr; otherwise it is a folder, and each output
+has its input's name. An output that exists is kept, which is no error, unless --overwrite is given.
+A frame that fails is reported, and the others are still done.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jflnr.cli.common import INPUT_ERRORS, guide_names, metrics_table, sentence, to_json
+from jflnr.cli.jobs import Job, plan
+
+if TYPE_CHECKING:
+    from jflnr.frame import Frame
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("inputs", metavar="IN", nargs="+", type=Path, help="EXR frames, or folders of them")
+    add("-o", "--output", metavar="OUT", type=Path, required=True, help="file or folder to write")
+    add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
+    add("--method", default="flr", help="the denoiser (flr)")
+    add("--backend", default="jax", help="what runs it: jax or opencl (jax)")
+    add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
+    add("--params", type=Path, metavar="FILE", help="parameters that `jflnr fit` wrote")
+    add("--sigma", type=float, help="standard deviation of the window, pixels")
+    add("--eps", type=float, help="multiplicative regularisation")
+    add("--eps-prime", type=float, help="additive regularisation")
+    add("--block", type=int, help="side of the squares of pixels that share one model")
+    add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
+    add("--reference", action="store_true", help="print metrics against the layer `reference`")
+    add("--overwrite", action="store_true", help="replace outputs that exist")
+    add("--json", action="store_true", help="print one JSON list instead of lines")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from tqdm import tqdm
+
+    jobs = plan(arguments.inputs, arguments.output)
+    settings = _settings(arguments)
+    records = []
+    with tqdm(jobs, unit="frame", disable=None, leave=False) as bar:
+        for job in bar:
+            records.append(record := _attempt(job, settings, arguments))
+            for line in _remarks(record):
+                bar.write(line, file=sys.stderr)
+            if not arguments.json and "error" not in record:
+                bar.write(_summary(record))
+    if arguments.json:
+        print(to_json(records))
+    return 2 if any("error" in record for record in records) else 0
+
+
+def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
+    from jflnr.flr import parameters
+
+    model, about = parameters.DEFAULT, dict[str, Any]()
+    if arguments.params:
+        model, about = parameters.load_parameters(arguments.params)
+    values = {}
+    for name in ("sigma", "eps", "eps_prime"):
+        given = getattr(arguments, name)
+        values[name] = float(getattr(model, name)) if given is None else given
+    return {
+        "method": arguments.method,
+        "backend": arguments.backend,
+        "parameters": parameters.Parameters.of(**values),
+        "guides": about.get("guides") if arguments.guides is None else arguments.guides,
+        "block": about.get("block", 8) if arguments.block is None else arguments.block,
+    }
+
+
+def _attempt(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
+    """Denoise one frame and say what became of it; a record that JSON can hold."""
+    record = {"input": str(job.source), "output": str(job.target)}
+    outputs = [job.target, job.preview] if arguments.png else [job.target]
+    kept = [str(path) for path in outputs if path.exists()]
+    if kept and not arguments.overwrite:
+        return record | {"status": "kept", "kept": kept}
+    try:
+        return record | {"status": "written"} | _denoise(job, settings, arguments)
+    except INPUT_ERRORS as error:
+        return record | {"status": "failed", "error": sentence(error)}
+
+
+def _denoise(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
+    from jflnr import exr
+    from jflnr.cli.preview import write_preview
+    from jflnr.denoise import denoise
+    from jflnr.frame import composite, read_frame, read_header
+
+    frame = read_frame(job.source, arguments.spp)
+    if arguments.reference and frame.reference is None:
+        raise ValueError(f"{job.source}: --reference needs a layer reference, and there is none")
+    start = time.perf_counter()
+    indirect = np.asarray(denoise(frame, **settings))
+    seconds = time.perf_counter() - start
+    picture = np.asarray(composite(frame, indirect))
+    about = _about(frame, settings, arguments.spp)
+
+    job.target.parent.mkdir(parents=True, exist_ok=True)
+    if arguments.png:
+        write_preview(job.preview, picture)
+    exr.write_channels(
+        job.target,
+        {
+            f"{layer}{c}": image[..., i]
+            for layer, image in (("indirect.", indirect), ("", picture))
+            for i, c in enumerate("RGB")
+        },
+        json.dumps(read_header(job.source) | {"denoiser": about}),
+        exr.read_attributes(job.source).window,
+    )
+    record = {
+        "width": picture.shape[1],
+        "height": picture.shape[0],
+        **about,
+        "seconds": seconds,
+        "warnings": _warnings(frame, settings),
+    }
+    if arguments.reference:
+        from jflnr.metrics import measure
+
+        record["metrics"] = {
+            "noisy": measure(frame, frame.indirect),
+            "denoised": measure(frame, indirect),
+        }
+    return record
+
+
+def _about(frame: "Frame", settings: dict[str, Any], spp: int) -> dict[str, Any]:
+    """What was done, for the record and for the header of the output."""
+    from jflnr.guides import choose
+
+    model = settings["parameters"]
+    return {
+        "method": settings["method"],
+        "backend": settings["backend"],
+        "spp": spp,
+        "guides": list(choose(frame, settings["guides"])),
+        "sigma": float(model.sigma),
+        "eps": float(model.eps),
+        "eps_prime": float(model.eps_prime),
+        "block": settings["block"],
+    }
+
+
+def _warnings(frame: "Frame", settings: dict[str, Any]) -> list[str]:
+    from jflnr.frame import not_finite
+
+    warnings = []
+    if settings["guides"] is None and frame.ao is None:
+        warnings.append("there is no layer ao; the guides are normal and depth")
+    if counts := not_finite(frame):
+        listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
+        warnings.append(f"pixels that are NaN or infinite, left out of the fit: {listed}")
+    return warnings
+
+
+def _remarks(record: dict[str, Any]) -> list[str]:
+    """Lines for stderr."""
+    lines = [f"jflnr: warning: {record['input']}: {text}" for text in record.get("warnings", ())]
+    if "error" in record:
+        lines.append(f"jflnr: {record['error']}")
+    return lines
+
+
+def _summary(record: dict[str, Any]) -> str:
+    """Lines for stdout."""
+    if record["status"] == "kept":
+        return f"{' and '.join(record['kept'])} kept as it is; --overwrite replaces it"
+    text = (
+        f"{record['input']} -> {record['output']}  {record['width']} x {record['height']}, "
+        f"{record['spp']} spp, {record['method']}, {record['seconds']:.2f} s"
+    )
+    return f"{text}\n{metrics_table(record['metrics'])}" if "metrics" in record else text

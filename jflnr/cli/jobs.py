@@ -1,0 +1,56 @@
+"""Which frames a command line means, and where their results go."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+PICTURES = (".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".tif", ".tiff")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One frame to read, and the EXR to write."""
+
+    source: Path
+    target: Path
+
+    @property
+    def preview(self) -> Path:
+        return self.target.with_suffix(".png")
+
+
+def expand(inputs: Sequence[Path]) -> list[Path]:
+    """The EXR files meant: a file stands for itself, a folder for the `*.exr` in it, sorted."""
+    files: list[Path] = []
+    for path in inputs:
+        if not path.is_dir():
+            files.append(path)
+            continue
+        found = sorted(p for p in path.glob("[!.]*") if p.suffix.lower() == ".exr")
+        if not found:
+            raise ValueError(f"{path}: there is no EXR file in this folder")
+        files.extend(found)
+    return files
+
+
+def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
+    """One job per frame; raises ValueError if two results would meet or one replace an input."""
+    files = expand(inputs)
+    as_file = output.suffix.lower() == ".exr" and not output.is_dir()
+    if as_file and (len(inputs) > 1 or inputs[0].is_dir()):
+        raise ValueError(f"{output}: OUT must be a folder when there are several frames")
+    if not as_file and output.suffix.lower() in PICTURES:
+        raise ValueError(f"{output}: OUT must end with .exr or be a folder (--png adds a preview)")
+    jobs = [Job(file, output if as_file else output / f"{file.stem}.exr") for file in files]
+    _check_apart(jobs)
+    return jobs
+
+
+def _check_apart(jobs: Sequence[Job]) -> None:
+    inputs = {job.source.resolve() for job in jobs}
+    sources: dict[Path, Path] = {}
+    for job in jobs:
+        if job.target.resolve() in inputs:
+            raise ValueError(f"{job.target}: OUT would replace an input")
+        if (other := sources.setdefault(job.target, job.source)) is not job.source:
+            raise ValueError(f"{other} and {job.source} would both be written to {job.target}")

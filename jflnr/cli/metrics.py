@@ -1,0 +1,57 @@
+"""metrics: measure an image against its reference.
+
+A is what to judge: a file that `jflnr denoise` wrote (its layer `indirect`), or a frame (its noisy
+layer `indirect_N`, N from --spp). B is a frame with the layers `albedo` and `reference`; without B,
+A is measured against its own reference.
+If neither file has a layer `reference`, their plain R, G, B are compared, B being the reference.
+
+PSNR, SSIM and FLIP are taken on the pictures as displayed (albedo * light, mean of the reference
+brought to 0.35, clipped, gamma 2.2); rMSE, SMAPE and the squared errors on linear radiance.
+`mse_unbiased` has the reference's own noise removed; it needs the layer `reference_a`.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from jflnr import layouts
+from jflnr.cli.common import metrics_table, to_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("a", metavar="A", type=Path, help="the image to judge, EXR")
+    parser.add_argument("b", metavar="B", type=Path, nargs="?", help="its reference, EXR")
+    parser.add_argument("--spp", type=int, default=1, metavar="N", help="noisy layer of a frame: 1")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    measured = measure_files(arguments.a, arguments.b or arguments.a, arguments.spp)
+    print(to_json(measured) if arguments.json else metrics_table({arguments.a.name: measured}))
+    return 0
+
+
+def measure_files(a: Path, b: Path, spp: int) -> dict[str, float | None]:
+    """The metrics of file `a` against file `b`, as this module's docstring says."""
+    from jflnr import exr, metrics
+    from jflnr.frame import read_frame
+
+    channels_a, channels_b = exr.read_channels(a), exr.read_channels(b)
+    if "reference" in exr.layers_of(channels_b):
+        return metrics.measure(read_frame(b, spp), _light(channels_a, spp, a))
+    return metrics.compare(_plain(channels_a, a), _plain(channels_b, b))
+
+
+def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:
+    layer = "indirect" if "indirect.R" in channels else f"indirect_{spp}"
+    return layouts.layer(channels, "indirect", tuple(f"{layer}.{c}" for c in "RGB"), str(path))
+
+
+def _plain(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
+    if missing := [c for c in "RGB" if c not in channels]:
+        raise ValueError(
+            f"{path}: nothing to compare: B holds no layer reference, and the plain channel "
+            f"{missing[0]} is missing here"
+        )
+    return np.stack([channels[c].astype(np.float32) for c in "RGB"], axis=-1)
