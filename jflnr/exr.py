@@ -151,7 +151,8 @@ def _check_file(path: Path) -> None:
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a folder, not an EXR file")
     try:
-        start = path.open("rb").read(len(MAGIC))
+        with path.open("rb") as file:
+            start = file.read(len(MAGIC))
     except OSError as error:
         raise OSError(f"{path} cannot be read: {error.strerror}.") from None
     if not start:

@@ -1,0 +1,65 @@
+"""What tests share: where the real frames are, and a small made-up one."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jflnr.frame import Frame, write_frame
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of real frames; the test is skipped where it is absent."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("JFLNR_DATA", beside))
+    if not folder.is_dir():
+        pytest.skip(f"the real frames are not here: {folder} (set JFLNR_DATA)")
+    return folder
+
+
+def make_frame(height: int = 24, width: int = 40, seed: int = 0) -> Frame:
+    """A frame with every layer, whose light is smooth and whose noise is strong."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:height, :width].astype(np.float32)[..., None] / width
+
+    def image(*layers: np.ndarray) -> np.ndarray:
+        return np.concatenate(np.broadcast_arrays(*layers), axis=-1).astype(np.float16, copy=False)
+
+    light = image(1 + x, 1 + y, 1.5 - x * y)
+    half = light * rng.gamma(100, 1 / 100, light.shape)
+    layers = {
+        "indirect": light * rng.exponential(size=light.shape),
+        "albedo": image(0.2 + 0.5 * x, 0.5 + 0 * x, 0.3 + 0.4 * y),
+        "normal": image(0 * x, 0 * x, 1 + 0 * x),
+        "depth": 2 + x,
+        "position": image(x, y, 2 + x),
+        "ao": 0.5 + 0.5 * x,
+        "mask": 1 + 0 * x,
+        "emission": image(0 * x, 0.1 + 0 * x, 0 * x),
+        "direct": image(x, y, x * y),
+        "reference": light,
+        "reference_a": half,
+        "motion": image(0 * x, 0 * x - 1),
+    }
+    # Through half precision, as a file stores them, so that what is read is what was written.
+    return Frame(
+        **{
+            name: layer.astype(np.float32 if name == "depth" else np.float16).astype(np.float32)
+            for name, layer in layers.items()
+        }
+    )
+
+
+@pytest.fixture
+def frame() -> Frame:
+    return make_frame()
+
+
+@pytest.fixture
+def frame_file(tmp_path: Path, frame: Frame) -> Path:
+    """The same frame as a file."""
+    path = tmp_path / "frame.exr"
+    write_frame(path, frame, header={"scene": "made up", "view": 0})
+    return path
