@@ -7,8 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from jflnr.flr.moments import Guides, into_strips, planes
 
-def apply(coefficients: jax.Array, guides: jax.Array, shift: jax.Array, block: int) -> jax.Array:
+
+def apply(coefficients: jax.Array, guides: Guides, shift: jax.Array, block: int) -> jax.Array:
     """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
 
     The coefficients at pixel p are those at block coordinate `(p + 0.5)/block - 0.5`, clamped
@@ -18,25 +20,26 @@ def apply(coefficients: jax.Array, guides: jax.Array, shift: jax.Array, block: i
     coefficients: `(Q + 1, C, h, w)`, from `solve`. guides: `(H, W, Q)`. shift: `(Q,)`.
     Returns `(H, W, C)`.
     """
-    height = guides.shape[0]
+    height = jax.tree.leaves(guides)[0].shape[0]
     rows = height // block
     above, below = _neighbours(coefficients, axis=2)
     grids = [jnp.moveaxis(grid, 2, 0) for grid in (above, coefficients, below)]
 
-    def strip(arrays: tuple[jax.Array, ...]) -> jax.Array:
+    def strip(arrays: tuple[Guides, jax.Array, jax.Array, jax.Array]) -> jax.Array:
         return _apply_strip(*arrays, shift=shift, block=block)
 
-    whole = guides[: rows * block].reshape(rows, block, *guides.shape[1:])
+    whole = jax.tree.map(lambda a: into_strips(a, block), guides)
     image = lax.map(strip, (whole, *(grid[:rows] for grid in grids)))
     image = image.reshape(rows * block, *image.shape[2:])
     if height % block:
-        rest = strip((guides[rows * block :], *(grid[rows] for grid in grids)))
+        rest_guides = jax.tree.map(lambda a: a[rows * block :], guides)
+        rest = strip((rest_guides, *(grid[rows] for grid in grids)))
         image = jnp.concatenate([image, rest])
     return image
 
 
 def _apply_strip(
-    guides: jax.Array,
+    guides: Guides,
     above: jax.Array,
     here: jax.Array,
     below: jax.Array,
@@ -45,7 +48,8 @@ def _apply_strip(
     block: int,
 ) -> jax.Array:
     """One row of blocks: guides `(rows, W, Q)` and three rows of models `(Q + 1, C, w)`."""
-    rows, width = guides.shape[:2]
+    rows, width = jax.tree.leaves(guides)[0].shape[:2]
+    x = [plane.astype(here.dtype) - s for plane, s in zip(planes(guides), shift, strict=True)]
     before, centre, after = (jnp.asarray(f, here.dtype) for f in _hat(block))
     vertical = (
         before[:rows, None] * above[:, :, None]
@@ -67,8 +71,7 @@ def _apply_strip(
     channels = []
     for c in range(here.shape[1]):
         total = at_pixels(0, c)
-        for q in range(shift.size):
-            guide = guides[..., q].astype(here.dtype) - shift[q]
+        for q, guide in enumerate(x):
             total += jnp.where(jnp.isfinite(guide), guide, 0) * at_pixels(q + 1, c)
         channels.append(total)
     return jnp.stack(channels, axis=-1)

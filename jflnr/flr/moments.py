@@ -7,9 +7,15 @@ be blurred like an image. First the lower triangle of `[1, X] [1, X]^T` row by r
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import jax
 import jax.numpy as jnp
 from jax import lax
+
+# One array `(H, W, Q)`, or several that make up the Q channels together, so that the layers of a
+# frame need not be copied into one.
+Guides: TypeAlias = jax.Array | tuple[jax.Array, ...]
 
 
 def index_xx(i: int, j: int) -> int:
@@ -28,7 +34,12 @@ def plane_count(guides: int, channels: int) -> int:
     return index_xy(guides + 1, 0, guides, channels)
 
 
-def centre(guides: jax.Array) -> jax.Array:
+def planes(image: Guides) -> list[jax.Array]:
+    """The channels of an image `(H, W, Q)`, or of several, one by one."""
+    return [layer[..., q] for layer in jax.tree.leaves(image) for q in range(layer.shape[-1])]
+
+
+def centre(guides: Guides) -> jax.Array:
     """A typical value of each guide, from a sparse grid of pixels.
 
     Moments are collected about it, since in float32 the variance of a guide far from zero (a world
@@ -36,12 +47,17 @@ def centre(guides: jax.Array) -> jax.Array:
 
     guides: `(H, W, Q)`. Returns `(Q,)`.
     """
-    step = [max(size // 32, 1) for size in guides.shape[:2]]
-    sample = guides[:: step[0], :: step[1]].astype(working_type(guides))
+    values = [_sparse_mean(plane) for plane in planes(guides)]
+    return lax.stop_gradient(jnp.stack(values) if values else jnp.zeros(0))
+
+
+def _sparse_mean(plane: jax.Array) -> jax.Array:
+    sample = plane[tuple(slice(None, None, max(size // 32, 1)) for size in plane.shape)]
+    sample = sample.astype(working_type(plane))
     finite = jnp.isfinite(sample)
-    total = jnp.sum(jnp.where(finite, sample, 0) / finite.size, axis=(0, 1))
-    share = jnp.sum(finite, axis=(0, 1)) / finite.size
-    return lax.stop_gradient(total / jnp.maximum(share, 1 / finite.size).astype(total.dtype))
+    # Divided before it is summed: values near the type's maximum must not overflow.
+    count = jnp.maximum(jnp.sum(finite), 1).astype(sample.dtype)
+    return jnp.sum(jnp.where(finite, sample, 0) / count)
 
 
 def working_type(*arrays: jax.Array) -> jnp.dtype:
@@ -49,15 +65,9 @@ def working_type(*arrays: jax.Array) -> jnp.dtype:
     return jnp.result_type(jnp.float32, *(array.dtype for array in arrays))
 
 
-def usable(target: jax.Array, guides: jax.Array, weight: jax.Array | None) -> jax.Array:
-    """`(H, W)`: True where a pixel takes part in the fit: all finite and weight above 0."""
-    good = jnp.all(jnp.isfinite(target), axis=-1) & jnp.all(jnp.isfinite(guides), axis=-1)
-    return good if weight is None else good & (weight > 0) & jnp.isfinite(weight)
-
-
 def collect(
     target: jax.Array,
-    guides: jax.Array,
+    guides: Guides,
     shift: jax.Array,
     block: int,
     weight: jax.Array | None = None,
@@ -67,43 +77,58 @@ def collect(
     Sums are divided by `block`^2 also where a block hangs over the border: the moment of 1 with
     itself then says how much of the block there was.
 
-    target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`, from `centre`. weight: `(H, W)` or
-    None; pixels of weight 0, and any that are not finite, are left out.
+    target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`, from `centre`. weight: `(H, W)`,
+    numbers or a boolean mask, or None; pixels of weight 0, and any that are not finite, are left
+    out.
     Returns `(K, ceil(H/block), ceil(W/block))`.
     """
-    height, width = target.shape[:2]
-    rows = height // block
-    inputs = (target, guides) if weight is None else (target, guides, weight)
+    rows = target.shape[0] // block
+    inputs = (target, guides, weight)
 
-    def strip(arrays: tuple[jax.Array, ...]) -> jax.Array:
+    def strip(arrays: tuple[jax.Array, Guides, jax.Array | None]) -> jax.Array:
         return _strip_moments(*arrays, shift=shift, block=block)
 
     # A strip of one block row stays in the cache while its products are formed.
-    whole = [a[: rows * block].reshape(rows, block, *a.shape[1:]) for a in inputs]
-    moments = lax.map(strip, tuple(whole))
-    if height % block:
-        rest = strip(tuple(a[rows * block :] for a in inputs))
+    moments = lax.map(strip, jax.tree.map(lambda a: into_strips(a, block), inputs))
+    if target.shape[0] % block:
+        rest = strip(jax.tree.map(lambda a: a[rows * block :], inputs))
         moments = jnp.concatenate([moments, rest[None]])
     return jnp.moveaxis(moments, 0, 1)
 
 
+def into_strips(image: jax.Array, block: int) -> jax.Array:
+    """`(H, W, ...)` to `(H // block, block, W, ...)`."""
+    rows = image.shape[0] // block
+    return image[: rows * block].reshape(rows, block, *image.shape[1:])
+
+
 def _strip_moments(
     target: jax.Array,
-    guides: jax.Array,
-    weight: jax.Array | None = None,
+    guides: Guides,
+    weight: jax.Array | None,
     *,
     shift: jax.Array,
     block: int,
 ) -> jax.Array:
     """Moments of one row of blocks: `(rows, W, ...)` to `(K, w)`."""
-    dtype = working_type(target, guides)
-    good = usable(target, guides, weight)
-    one = good.astype(dtype) if weight is None else jnp.where(good, weight, 0).astype(dtype)
-    x = [jnp.where(good, guides[..., q].astype(dtype) - shift[q], 0) for q in range(shift.size)]
-    y = [jnp.where(good, target[..., c].astype(dtype), 0) for c in range(target.shape[-1])]
-    weighted = [one] + (x if weight is None else [one * a for a in x])
+    dtype = working_type(target, *jax.tree.leaves(guides))
+    x = [plane.astype(dtype) - s for plane, s in zip(planes(guides), shift, strict=True)]
+    y = [plane.astype(dtype) for plane in planes(target)]
+    good = jnp.all(jnp.isfinite(target), axis=-1)
+    for layer in jax.tree.leaves(guides):
+        good &= jnp.all(jnp.isfinite(layer), axis=-1)
+    if weight is not None:
+        good &= weight if weight.dtype == bool else (weight > 0) & jnp.isfinite(weight)
+    x = [jnp.where(good, plane, 0) for plane in x]
+    y = [jnp.where(good, plane, 0) for plane in y]
+    one = good.astype(dtype)
+    weighted = [one, *x]
+    if weight is not None and weight.dtype != bool:
+        one = jnp.where(good, weight, 0).astype(dtype)
+        weighted = [one, *(one * plane for plane in x)]
     products = [one]
-    products += [weighted[i] * x[j - 1] if j else weighted[i] for i in range(1, len(weighted)) for j in range(i + 1)]
+    for i in range(1, len(weighted)):
+        products += [weighted[i], *(weighted[i] * x[j] for j in range(i))]
     products += [a * b for a in weighted for b in y]
     # Rows first: contiguous additions; then the columns, with an eighth of the data.
     sums = jnp.stack([jnp.sum(product, axis=0) for product in products])

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import jax
 
-from jflnr.checks import check_flr
 from jflnr.flr.apply import apply
+from jflnr.flr.arguments import check_regression
 from jflnr.flr.blur import blur
-from jflnr.flr.moments import centre, collect
+from jflnr.flr.moments import Guides, centre, collect
 from jflnr.flr.parameters import Parameters
 from jflnr.flr.solve import Solver, solve
 
 
 def flr(
     target: jax.Array,
-    guides: jax.Array,
+    guides: Guides,
     parameters: Parameters,
     *,
     block: int = 8,
     support: int = 72,
-    guides_map: jax.Array | None = None,
+    guides_map: Guides | None = None,
     weight: jax.Array | None = None,
     solver: Solver = "cholesky",
 ) -> jax.Array:
@@ -28,7 +28,8 @@ def flr(
     Linear in `target`: images denoised together as more channels sum to the denoised sum, and
     share the factorisation. With no guides (Q = 0) this is a Gaussian blur.
 
-    target: `(H, W, C)`, the noisy radiance Y. guides: `(H, W, Q)`, X without the constant.
+    target: `(H, W, C)`, the noisy radiance Y. guides: `(H, W, Q)`, X without the constant,
+    or several such arrays that make up the Q channels together.
     parameters: window and regularisation. block: side of the squares of pixels that share one
     model; 1 is the exact per-pixel model. support: how far the window reaches, in pixels of the
     output; at least three sigma. guides_map: `(f H, f W, Q)` with an integer f >= 1, the guides
@@ -40,7 +41,7 @@ def flr(
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
-    factor = check_flr(target, guides, guides_map, weight, block, support)
+    factor = check_regression(target, guides, guides_map, weight, block, support)
     shift = centre(guides)
     moments = collect(target, guides, shift, block, weight)
     step = block * factor

@@ -80,7 +80,7 @@ def cholesky_solve(matrix: Matrix, right: Matrix) -> Matrix:
     """
     size = len(matrix)
     lower: Matrix = []
-    inverse_diagonal = []
+    inverse_diagonal: list[jax.Array] = []
     for i in range(size):
         row: list[jax.Array] = []
         for j in range(i):
@@ -117,10 +117,7 @@ def _inverse_root(pivot: jax.Array) -> jax.Array:
 def block_inverse_solve(matrix: Matrix, right: Matrix) -> Matrix:
     """Solve by the paper's recursive block-matrix inverse (Appendix, first formula)."""
     inverse = _block_inverse(
-        [
-            [matrix[max(i, j)][min(i, j)] for j in range(len(matrix))]
-            for i in range(len(matrix))
-        ]
+        [[matrix[max(i, j)][min(i, j)] for j in range(len(matrix))] for i in range(len(matrix))]
     )
     return _product(inverse, right)
 

@@ -1,0 +1,97 @@
+"""From a frame to denoised light: the one call most people need."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import warnings
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jflnr import checks
+from jflnr import guides as guide_layers
+from jflnr.flr.parameters import DEFAULT, Parameters
+from jflnr.flr.regression import flr
+from jflnr.frame import Array, Frame
+
+METHODS = ("flr",)
+BACKENDS = ("jax",)
+
+
+def denoise(
+    frame: Frame,
+    method: str = "flr",
+    *,
+    backend: str = "jax",
+    guides: Sequence[str] | None = None,
+    parameters: Parameters | None = None,
+    block: int = 8,
+) -> Array:
+    """Denoise the indirect light of a frame.
+
+    frame: as from `read_frame`. Its `indirect` may have any number of channels C: several light
+    groups side by side are denoised together, and their results sum to the denoised sum. It may
+    also be smaller than the other layers by a whole factor; the result then has their size.
+    method: one of `METHODS`. guides: names out of normal, depth, ao, position, albedo; by default
+    normal, depth and, where the frame has it, ao. parameters: the fitted defaults if None.
+    block: pixels on a side that share one model.
+    Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
+    Returns `(H, W, C)` float32, demodulated indirect radiance.
+
+    Raises `ValueError` or `TypeError` naming the argument, also if no pixel can be used. Warns if
+    the frame has no ambient occlusion.
+    """
+    checks.choice("method", method, METHODS)
+    checks.choice("backend", backend, BACKENDS)
+    names = guide_layers.choose(frame, guides)
+    if guides is None and frame.ao is None:
+        warnings.warn(
+            "The frame has no ao layer, so the guides are normal and depth only; "
+            "shadows cast by indirect light may be lost.",
+            stacklevel=2,
+        )
+    if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
+        raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
+    parameters = DEFAULT if parameters is None else parameters
+    return _denoise(frame_inputs(frame, names), parameters, names, block, _support(parameters))
+
+
+def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
+    """The frame reduced to the layers that denoising reads, so that others cost nothing."""
+    needed = {"indirect", "normal", "depth", "mask", *names}
+    unused = {field.name: None for field in dataclasses.fields(Frame) if field.name not in needed}
+    return dataclasses.replace(frame, **unused)  # type: ignore[arg-type]
+
+
+def _support(parameters: Parameters) -> int:
+    """Three standard deviations, in steps of 24 pixels so that few programs are compiled."""
+    if isinstance(parameters.log_sigma, jax.core.Tracer):
+        return 72
+    return 24 * max(int(np.ceil(float(parameters.sigma) * 3 / 24)), 1)
+
+
+@functools.partial(jax.jit, static_argnames=("names", "block", "support"))
+def _denoise(
+    frame: Frame, parameters: Parameters, names: tuple[str, ...], block: int, support: int
+) -> jax.Array:
+    layers = guide_layers.layers(frame, names)
+    mask = None if frame.mask is None else jnp.asarray(frame.mask)
+    target = jnp.asarray(frame.indirect)
+    factor = -(-frame.normal.shape[0] // target.shape[0])
+    if factor == 1:
+        weight = None if mask is None else mask[..., 0] > 0
+        return flr(target, layers, parameters, block=block, support=support, weight=weight)
+    coarse = tuple(guide_layers.shrink(layer, factor, mask) for layer in layers)
+    weight = None if mask is None else guide_layers.shrink(mask, factor)[..., 0]
+    return flr(
+        target,
+        coarse,
+        parameters,
+        block=max(block // factor, 1),
+        support=support,
+        guides_map=layers,
+        weight=weight,
+    )

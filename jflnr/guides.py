@@ -1,0 +1,75 @@
+"""From the layers of a frame to the guides X of the regression (DESIGN.md, "Guides")."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+
+from jflnr.frame import Array, Frame
+
+DEFAULT = ("normal", "depth", "ao")
+NAMES = ("normal", "depth", "ao", "position", "albedo")
+
+
+def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
+    """The guides to use: those asked for, or by default those of normal, depth, ao that exist.
+
+    Raises `ValueError` for a name that is no guide, is named twice, or that the frame lacks.
+    """
+    if names is None:
+        return tuple(name for name in DEFAULT if getattr(frame, name) is not None)
+    there = [name for name in NAMES if getattr(frame, name) is not None]
+    for name in names:
+        if name not in NAMES:
+            raise ValueError(f"guides: {name!r} is none of {', '.join(NAMES)}")
+        if name not in there:
+            raise ValueError(f"guides: the frame has no {name} layer; it has {', '.join(there)}")
+    if len(set(names)) < len(names):
+        raise ValueError(f"guides: {', '.join(names)} names one of them twice")
+    return tuple(names)
+
+
+def typical_depth(depth: Array, mask: Array | None) -> jax.Array:
+    """Median depth of the surfaces, from a regular grid of at most about 65 000 pixels; 1 if none.
+
+    depth: `(H, W, 1)` in scene units. mask: `(H, W, 1)` or None. Returns a scalar.
+    """
+    step = max(round((depth.shape[0] * depth.shape[1] / 65536) ** 0.5), 1)
+    sample = jnp.asarray(depth[::step, ::step, 0], jnp.float32)
+    surface = sample > 0 if mask is None else jnp.asarray(mask[::step, ::step, 0]) > 0
+    median = jnp.nanmedian(jnp.where(surface & jnp.isfinite(sample), sample, jnp.nan))
+    return jnp.where(median > 0, median, 1)
+
+
+def layers(frame: Frame, names: Sequence[str]) -> tuple[jax.Array, ...]:
+    """The guides as separate layers `(H, W, C)`, free of the scene's unit of length.
+
+    Depth is divided by its median over the mask; so is the position, about a point of the scene.
+    """
+    scale = 1 / typical_depth(frame.depth, frame.mask)
+    chosen = {name: jnp.asarray(getattr(frame, name)) for name in names}
+    if "depth" in chosen:
+        chosen["depth"] = chosen["depth"] * scale
+    if "position" in chosen:
+        # Regularisation grows with a guide's distance from zero, and the origin means nothing.
+        middle = chosen["position"][frame.depth.shape[0] // 2, frame.depth.shape[1] // 2]
+        chosen["position"] = (chosen["position"] - jnp.nan_to_num(middle)) * scale
+    return tuple(chosen[name] for name in names)
+
+
+def shrink(image: jax.Array, factor: int, mask: jax.Array | None = None) -> jax.Array:
+    """Mean over `factor` x `factor` pixels, of those in the mask only.
+
+    image: `(H, W, C)`. mask: `(H, W, 1)` or None. Returns `(ceil(H/f), ceil(W/f), C)`.
+    """
+    weight = jnp.ones((*image.shape[:2], 1), image.dtype) if mask is None else mask
+    margins = [(0, -size % factor) for size in image.shape[:2]] + [(0, 0)]
+
+    def totals(x: jax.Array) -> jax.Array:
+        x = jnp.pad(x, margins)
+        h, w, c = x.shape[0] // factor, x.shape[1] // factor, x.shape[2]
+        return x.reshape(h, factor, w, factor, c).sum((1, 3))
+
+    return totals(image * weight) / jnp.maximum(totals(weight), 1e-6)
