@@ -9,7 +9,7 @@ import contextlib
 import io
 import os
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from jflnr.files import replacing
 
 PathLike = str | os.PathLike[str]
 
+COMPONENTS = "RGBAXYZ"
 MAGIC = b"\x76\x2f\x31\x01"
 # A small damaged header can announce any size. No real frame packs better than this.
 ALWAYS_ALLOWED_BYTES = 1 << 30
@@ -47,12 +48,12 @@ def layer_of(channel: str) -> str:
     return channel.rpartition(".")[0]
 
 
-def layers_of(channels: Mapping[str, Any]) -> dict[str, list[str]]:
-    """The components of each layer, in the file's order: {"normal": ["X", "Y", "Z"]}."""
+def layers_of(channels: Iterable[str]) -> dict[str, list[str]]:
+    """The components of each layer, as people order them: {"normal": ["X", "Y", "Z"]}."""
     layers: dict[str, list[str]] = {}
-    for name in channels:
+    for name in sorted(channels, key=lambda name: (COMPONENTS.find(name[-1]), name)):
         layers.setdefault(layer_of(name), []).append(name.rpartition(".")[2])
-    return layers
+    return dict(sorted(layers.items()))
 
 
 def read_attributes(path: PathLike) -> Attributes:

@@ -5,12 +5,12 @@ import numerical code inside the functions that run it, so that `--help` and `in
 """
 
 import argparse
-import importlib.metadata
 import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+from jflnr import __version__
 from jflnr.cli import denoise, fit, info, metrics
 from jflnr.cli.common import INPUT_ERRORS, sentence
 
@@ -44,7 +44,7 @@ class _Parser(argparse.ArgumentParser):
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="jflnr", description="Denoise path-traced global illumination.")
-    parser.add_argument("--version", action="version", version=_version())
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, module in COMMANDS.items():
         summary = (module.__doc__ or "").partition("\n")[0].partition(": ")[2]
@@ -58,10 +58,3 @@ def _parser() -> argparse.ArgumentParser:
         module.add_arguments(command)
         command.set_defaults(run=module.run)
     return parser
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("jflnr")
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown (not installed)"

@@ -9,9 +9,11 @@ A frame that fails is reported, and the others are still done.
 """
 
 import argparse
+import dataclasses
 import json
 import sys
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,8 +65,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
+    from jflnr import checks
+    from jflnr.denoising import BACKENDS, METHODS
     from jflnr.flr import parameters
 
+    checks.choice("--method", arguments.method, METHODS)
+    checks.choice("--backend", arguments.backend, BACKENDS)
     model, about = parameters.DEFAULT, dict[str, Any]()
     if arguments.params:
         model, about = parameters.load_parameters(arguments.params)
@@ -97,21 +103,26 @@ def _attempt(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) 
 def _denoise(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
     from jflnr import exr
     from jflnr.cli.preview import write_preview
-    from jflnr.denoise import denoise
+    from jflnr.denoising import denoise
     from jflnr.frame import composite, read_frame, read_header
+    from jflnr.metrics import exposure, measure
 
     frame = read_frame(job.source, arguments.spp)
     if arguments.reference and frame.reference is None:
         raise ValueError(f"{job.source}: --reference needs a layer reference, and there is none")
     start = time.perf_counter()
-    indirect = np.asarray(denoise(frame, **settings))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        indirect = np.asarray(denoise(frame, **settings))
     seconds = time.perf_counter() - start
     picture = np.asarray(composite(frame, indirect))
     about = _about(frame, settings, arguments.spp)
 
     job.target.parent.mkdir(parents=True, exist_ok=True)
     if arguments.png:
-        write_preview(job.preview, picture)
+        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
+        lit = composite(dataclasses.replace(frame, emission=None), indirect)
+        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
     exr.write_channels(
         job.target,
         {
@@ -127,11 +138,9 @@ def _denoise(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) 
         "height": picture.shape[0],
         **about,
         "seconds": seconds,
-        "warnings": _warnings(frame, settings),
+        "warnings": [*(str(warning.message) for warning in caught), *_not_finite(frame)],
     }
     if arguments.reference:
-        from jflnr.metrics import measure
-
         record["metrics"] = {
             "noisy": measure(frame, frame.indirect),
             "denoised": measure(frame, indirect),
@@ -156,16 +165,13 @@ def _about(frame: "Frame", settings: dict[str, Any], spp: int) -> dict[str, Any]
     }
 
 
-def _warnings(frame: "Frame", settings: dict[str, Any]) -> list[str]:
+def _not_finite(frame: "Frame") -> list[str]:
     from jflnr.frame import not_finite
 
-    warnings = []
-    if settings["guides"] is None and frame.ao is None:
-        warnings.append("there is no layer ao; the guides are normal and depth")
-    if counts := not_finite(frame):
-        listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
-        warnings.append(f"pixels that are NaN or infinite, left out of the fit: {listed}")
-    return warnings
+    if not (counts := not_finite(frame)):
+        return []
+    listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
+    return [f"some pixels are NaN or infinite, and count for nothing in the fit: {listed}"]
 
 
 def _remarks(record: dict[str, Any]) -> list[str]:

@@ -34,7 +34,7 @@ def describe(path: Path) -> dict[str, Any]:
         "origin": list(attributes.window.origin),
         "compression": attributes.compression,
         "parts": attributes.parts,
-        "layers": [_layer(name, parts, channels) for name, parts in _ordered(channels)],
+        "layers": [_layer(*layer, channels) for layer in exr.layers_of(channels).items()],
         "denoiser": _use(channels, str(path)),
     }
 
@@ -63,24 +63,14 @@ def as_text(facts: dict[str, Any]) -> str:
     )
 
 
-def _ordered(channels: dict[str, np.ndarray]) -> list[tuple[str, str]]:
-    """Layers with their components in the order people write them: RGB(A), XYZ."""
-    order = {c: i for i, c in enumerate("RGBAXYZ")}
-    layers = exr.layers_of(channels)
-    return [
-        (name, " ".join(sorted(parts, key=lambda c: (order.get(c, 99), c))))
-        for name, parts in layers.items()
-    ]
-
-
-def _layer(name: str, components: str, channels: dict[str, np.ndarray]) -> dict[str, Any]:
-    names = [f"{name}.{c}" if name else c for c in components.split()]
+def _layer(name: str, parts: list[str], channels: dict[str, np.ndarray]) -> dict[str, Any]:
+    names = [f"{name}.{c}" if name else c for c in parts]
     pixels = np.stack([channels[n] for n in names], axis=-1)
     finite = np.isfinite(pixels)
     values = pixels[finite]
     return {
         "layer": name,
-        "channels": components,
+        "channels": " ".join(parts),
         "type": "/".join(sorted({TYPES[channels[n].dtype.name] for n in names})),
         "min": float(values.min()) if values.size else None,
         "max": float(values.max()) if values.size else None,
