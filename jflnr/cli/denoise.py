@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
     from jflnr import checks
-    from jflnr.denoising import BACKENDS, METHODS
+    from jflnr.denoising import BACKENDS, BLOCK, METHODS
     from jflnr.flr import parameters
 
     checks.choice("--method", arguments.method, METHODS)
@@ -82,9 +82,17 @@ def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
         "method": arguments.method,
         "backend": arguments.backend,
         "parameters": parameters.Parameters.of(**values),
-        "guides": about.get("guides") if arguments.guides is None else arguments.guides,
-        "block": about.get("block", 8) if arguments.block is None else arguments.block,
+        "guides": _guides(about) if arguments.guides is None else arguments.guides,
+        "block": about.get("block", BLOCK) if arguments.block is None else arguments.block,
     }
+
+
+def _guides(about: dict[str, Any]) -> list[str] | None:
+    """The guides that a parameter file names, if it does."""
+    guides = about.get("guides")
+    if guides is None or (isinstance(guides, list) and all(isinstance(g, str) for g in guides)):
+        return guides
+    raise ValueError(f"--params: its guides must be a list of names; got {guides!r}")
 
 
 def _attempt(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
