@@ -17,6 +17,8 @@ from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.regression import flr
 from jflnr.frame import Array, Frame
 
+# Pixels on a side that share one model: the size the paper found to lose nothing.
+BLOCK = 8
 METHODS = ("flr",)
 BACKENDS = ("jax",)
 
@@ -28,7 +30,7 @@ def denoise(
     backend: str = "jax",
     guides: Sequence[str] | None = None,
     parameters: Parameters | None = None,
-    block: int = 8,
+    block: int = BLOCK,
 ) -> Array:
     """Denoise the indirect light of a frame.
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax import lax
 
 from jflnr.flr.moments import index_xx, index_xy
 from jflnr.flr.parameters import Parameters
 
-Matrix = list[list[jax.Array]]
 Solver = Literal["cholesky", "block-inverse"]
 
 
@@ -32,131 +33,95 @@ def solve(
     moments: `(K, h, w)`, blurred. shift: `(Q,)`. channels: the number C of target channels.
     Returns `(Q + 1, C, h, w)`: the value of Y at X = shift, then the slope of each guide.
     """
-    q, eps, eps_prime = shift.size, parameters.eps, parameters.eps_prime
-    eps, eps_prime = eps.astype(moments.dtype), eps_prime.astype(moments.dtype)
+    eps = parameters.eps.astype(moments.dtype)
+    eps_prime = parameters.eps_prime.astype(moments.dtype)
+    count = shift.size
     n = moments[0]
     filled = n > 1e-12
-    per_pixel = jnp.where(filled, 1 / jnp.where(filled, n, 1), 0)
+    means = moments * jnp.where(filled, 1 / jnp.where(filled, n, 1), 0)
 
-    def xx(i: int, j: int) -> jax.Array:
-        return moments[index_xx(i, j)] * per_pixel
+    # Eq. 13 and 15, about the shift.
+    pairs = [[index_xx(i + 1, j + 1) for j in range(count)] for i in range(count)]
+    cross = [[index_xy(i + 1, c, count, channels) for c in range(channels)] for i in range(count)]
+    mean_x = _pick(means, [index_xx(i + 1, 0) for i in range(count)])
+    mean_y = _pick(means, [index_xy(0, c, count, channels) for c in range(channels)])
+    covariance = _pick(means, pairs) - mean_x[:, None] * mean_x
 
-    def xy(i: int, c: int) -> jax.Array:
-        return moments[index_xy(i, c, q, channels)] * per_pixel
+    # Eq. 18; rounding can leave a flat guide's variance just below zero.
+    diagonal = jnp.eye(count, dtype=bool)[:, :, None, None]
+    covariance = jnp.where(diagonal, jnp.maximum(covariance, 0), covariance)
+    mu = mean_x + shift[:, None, None].astype(moments.dtype)
+    outer = mu[:, None] * mu
+    regular = covariance + eps * outer + jnp.where(diagonal, eps * outer + eps_prime, 0)
 
-    centred = [xx(i + 1, 0) for i in range(q)]
-    mean = [m + s for m, s in zip(centred, shift, strict=True)]
-    mean_y = [xy(0, c) for c in range(channels)]
-    w: Matrix = [
-        [xx(i + 1, j + 1) - centred[i] * centred[j] + eps * mean[i] * mean[j] for j in range(i + 1)]
-        for i in range(q)
-    ]
-    for i in range(q):
-        # Rounding can leave a flat guide's variance just below zero.
-        variance = jnp.maximum(w[i][i] - eps * mean[i] ** 2, 0)
-        w[i][i] = variance + 2 * eps * mean[i] ** 2 + eps_prime
-    scale = [jax.lax.rsqrt(w[i][i]) for i in range(q)]
-    correlation: Matrix = [
-        [w[i][j] * scale[i] * scale[j] if j < i else 1 + eps_prime for j in range(i + 1)]
-        for i in range(q)
-    ]
-    right = [
-        [(xy(i + 1, c) - centred[i] * mean_y[c]) * scale[i] for c in range(channels)]
-        for i in range(q)
-    ]
-    solution = SOLVERS[solver](correlation, right)
-    slopes = [[solution[i][c] * scale[i] for c in range(channels)] for i in range(q)]
-    value = [
-        mean_y[c] - sum((centred[i] * slopes[i][c] for i in range(q)), jnp.zeros_like(n))
-        for c in range(channels)
-    ]
-    return jnp.stack([jnp.stack(row) for row in [value, *slopes]])
+    # Eq. 19 to 22, with a unit diagonal before eps' is added.
+    scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)])) if count else mean_x
+    correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)
+    right = (_pick(means, cross) - mean_x[:, None] * mean_y) * scale[:, None]
+    slopes = SOLVERS[solver](correlation, right) * scale[:, None]
+
+    # Eq. 23 as an affine function of X - shift.
+    value = mean_y - jnp.sum(mean_x[:, None] * slopes, axis=0)
+    return jnp.concatenate([value[None], slopes])
 
 
-def cholesky_solve(matrix: Matrix, right: Matrix) -> Matrix:
-    """Solve `matrix @ a = right` by Cholesky, written out over planes.
+def _pick(planes: jax.Array, indices: list[Any]) -> jax.Array:
+    """Planes by their numbers: `(K, h, w)` to `(*shape of indices, h, w)`."""
+    table = np.array(indices, int)
+    shape = table.shape if table.size else (0, *table.shape[1:])
+    return planes[table.reshape(-1)].reshape(*shape, *planes.shape[1:])
 
-    matrix: lower triangle, `matrix[i][j]` an `(h, w)` plane. right: rows of planes.
+
+def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
+    """Solve `matrix @ a = right` by Cholesky in its root-free form, `matrix = L D L^T`.
+
+    matrix: `(Q, Q, h, w)`, symmetric with a diagonal near 1. right: `(Q, C, h, w)`.
+    Returns `(Q, C, h, w)`. A pivot that is no larger than the rounding error belongs to a guide
+    that the ones before it already explain: that guide gets the slope 0.
     """
-    size = len(matrix)
-    lower: Matrix = []
-    inverse_diagonal: list[jax.Array] = []
-    for i in range(size):
-        row: list[jax.Array] = []
-        for j in range(i):
-            rest = matrix[i][j] - sum(row[k] * lower[j][k] for k in range(j))
-            row.append(rest * inverse_diagonal[j])
-        pivot = matrix[i][i] - sum(entry * entry for entry in row)
-        inverse_diagonal.append(_inverse_root(pivot))
-        lower.append(row)
-    forward: Matrix = []
-    for i in range(size):
-        forward.append([
-            (b - sum(lower[i][k] * forward[k][c] for k in range(i))) * inverse_diagonal[i]
-            for c, b in enumerate(right[i])
-        ])  # fmt: skip
-    backward: Matrix = [[] for _ in range(size)]
-    for i in reversed(range(size)):
-        backward[i] = [
-            (b - sum(lower[k][i] * backward[k][c] for k in range(i + 1, size)))
-            * inverse_diagonal[i]
-            for c, b in enumerate(forward[i])
-        ]
-    return backward
+    steps = []
+    while matrix.shape[0]:
+        pivot, row, first = matrix[0, 0], matrix[0, 1:], right[0]
+        clear = pivot > 8 * jnp.finfo(pivot.dtype).eps
+        inverse = jnp.where(clear, 1 / jnp.where(clear, pivot, 1), 0)
+        steps.append((inverse, row, first))
+        factor = row * inverse
+        matrix = matrix[1:, 1:] - factor[:, None] * row
+        right = right[1:] - factor[:, None] * first
+    solution = right
+    for inverse, row, first in reversed(steps):
+        known = jnp.sum(row[:, None] * solution, axis=0)
+        solution = jnp.concatenate([((first - known) * inverse)[None], solution])
+    return solution
 
 
-def _inverse_root(pivot: jax.Array) -> jax.Array:
-    """1/sqrt of a pivot of a matrix with unit diagonal, where it is above the rounding error.
-
-    A pivot below it belongs to a guide that the earlier ones already explain: it gets slope 0.
-    """
-    clear = pivot > 8 * jnp.finfo(pivot.dtype).eps
-    return jnp.where(clear, jax.lax.rsqrt(jnp.where(clear, pivot, 1)), 0)
-
-
-def block_inverse_solve(matrix: Matrix, right: Matrix) -> Matrix:
+def block_inverse_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
     """Solve by the paper's recursive block-matrix inverse (Appendix, first formula)."""
-    inverse = _block_inverse(
-        [[matrix[max(i, j)][min(i, j)] for j in range(len(matrix))] for i in range(len(matrix))]
-    )
-    return _product(inverse, right)
+    return _product(_block_inverse(matrix), right)
 
 
-def _block_inverse(matrix: Matrix) -> Matrix:
-    """Inverse of a symmetric matrix of planes by halving it."""
-    size = len(matrix)
-    if size == 0:
-        return []
-    if size == 1:
-        return [[1 / matrix[0][0]]]
-    half = size // 2
-    a_inverse = _block_inverse([row[:half] for row in matrix[:half]])
-    b = [row[half:] for row in matrix[:half]]
-    c = [row[:half] for row in matrix[half:]]
-    a_inverse_b = _product(a_inverse, b)
-    projected = _product(c, a_inverse_b)
-    schur = [
-        [matrix[half + i][half + j] - projected[i][j] for j in range(size - half)]
-        for i in range(size - half)
-    ]
+def _block_inverse(matrix: jax.Array) -> jax.Array:
+    """Inverse of symmetric matrices `(Q, Q, h, w)` by halving them."""
+    if matrix.shape[0] <= 1:
+        return 1 / matrix
+    half = matrix.shape[0] // 2
+    a_inverse = _block_inverse(matrix[:half, :half])
+    a_inverse_b = _product(a_inverse, matrix[:half, half:])
+    schur = matrix[half:, half:] - _product(matrix[half:, :half], a_inverse_b)
     schur_inverse = _block_inverse(schur)
-    upper_right = [[-entry for entry in row] for row in _product(a_inverse_b, schur_inverse)]
-    lower_left = [list(column) for column in zip(*upper_right, strict=True)]
-    correction = _product(upper_right, [list(column) for column in zip(*a_inverse_b, strict=True)])
-    upper_left = [
-        [a - b for a, b in zip(row, minus, strict=True)]
-        for row, minus in zip(a_inverse, correction, strict=True)
-    ]
-    top = [x + y for x, y in zip(upper_left, upper_right, strict=True)]
-    return top + [x + y for x, y in zip(lower_left, schur_inverse, strict=True)]
+    upper_right = -_product(a_inverse_b, schur_inverse)
+    upper_left = a_inverse - _product(upper_right, jnp.swapaxes(a_inverse_b, 0, 1))
+    lower_left = jnp.swapaxes(upper_right, 0, 1)
+    top = jnp.concatenate([upper_left, upper_right], axis=1)
+    return jnp.concatenate([top, jnp.concatenate([lower_left, schur_inverse], axis=1)])
 
 
-def _product(a: Matrix, b: Matrix) -> Matrix:
-    columns = list(zip(*b, strict=True))
-    return [[sum(x * y for x, y in zip(row, col, strict=True)) for col in columns] for row in a]
+def _product(a: jax.Array, b: jax.Array) -> jax.Array:
+    """Matrix product over the first two axes."""
+    return jnp.sum(a[:, :, None] * b, axis=1)
 
 
-SOLVERS: dict[str, Callable[[Matrix, Matrix], Matrix]] = {
+SOLVERS: dict[str, Callable[[jax.Array, jax.Array], jax.Array]] = {
     "cholesky": cholesky_solve,
     "block-inverse": block_inverse_solve,
 }

@@ -1,0 +1,1 @@
+"""How jflnr argues: one file per question. `python -m experiments list` names them."""

@@ -1,0 +1,59 @@
+"""python -m experiments list | run NAME... | report | render SCENE..."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+
+from experiments import results
+
+NAMES = ("speed", "parameters", "ablation", "opencl")
+
+
+def main(argv: list[str]) -> int:
+    if argv[:1] == ["render"]:
+        return importlib.import_module("experiments.render.command").main(argv[1:])
+    arguments = _parser().parse_args(argv)
+    names = NAMES if getattr(arguments, "names", None) in (None, ["all"]) else arguments.names
+    try:
+        for name in names:
+            if arguments.command == "list":
+                print(f"{name:12}{_module(name).QUESTION}")
+            elif arguments.command == "run":
+                results.run(_module(name), arguments.quick, arguments.out)
+                results.draw(_module(name), arguments.out, arguments.docs)
+            elif (arguments.out / f"{name}.json").exists():
+                results.draw(_module(name), arguments.out, arguments.docs)
+    except (OSError, ValueError) as error:
+        print(f"experiments: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _module(name: str) -> results.Experiment:
+    if name not in NAMES:
+        raise ValueError(f"{name!r} is none of the experiments: {', '.join(NAMES)}")
+    return importlib.import_module(f"experiments.{name}")  # type: ignore[return-value]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m experiments", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="the experiments and their questions")
+    run = commands.add_parser("run", help="run experiments by name, or all")
+    run.add_argument("names", nargs="+", metavar="NAME")
+    run.add_argument("--quick", action="store_true", help="a small version, in under a minute")
+    report = commands.add_parser("report", help="draw charts and tables from results on disk")
+    for command in (run, report):
+        command.add_argument("--out", type=Path, default=Path("out"), help="folder of results")
+        command.add_argument("--docs", type=Path, help="where charts and tables go (default: OUT)")
+    commands.add_parser("render", help="render frames; see `render --help`", add_help=False)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
