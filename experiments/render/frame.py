@@ -1,0 +1,118 @@
+"""Renders one frame: every layer of docs/scenes.md, and what its header says."""
+
+from __future__ import annotations
+
+import json
+
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.render.camera import Camera
+from experiments.render.reference import Accumulator, Goal
+from experiments.render.sampling import stream_seed
+from experiments.render.tracer import Tracer
+from jflnr.exr import write_channels
+
+AXES = {"normal": "XYZ", "position": "XYZ", "depth": "Z", "ao": "Y", "mask": "Y", "motion": "XY"}
+SINGLE = ("depth",)  # in float; every other layer in half
+RENDERER = 2  # counts the changes that alter the frames
+
+Layers = dict[str, NDArray[np.floating[Any]]]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a frame holds. `noisy` are the sample counts, `realisations` those of 1 spp."""
+
+    width: int = 640
+    height: int = 360
+    seed: int = 0
+    noisy: tuple[int, ...] = (1,)
+    realisations: int = 1
+    bounces: int = 1
+    mis: bool = True
+    direct_spp: int = 128
+    ao_rays: int = 64
+    goal: Goal = field(default_factory=Goal)
+
+
+def noisy_names(settings: Settings) -> dict[str, int]:
+    """Names of the noisy layers and their sample counts: indirect_1, indirect_1_b, indirect_2..."""
+    names = {f"indirect_{n}": n for n in settings.noisy}
+    letters = "abcdefghijklmnopqrstuvwxyz"[1 : settings.realisations]
+    return names | {f"indirect_1_{letter}": 1 for letter in letters}
+
+
+def render(
+    scene: Any,
+    camera: Camera,
+    settings: Settings,
+    ao_distance: float,
+    state: Path | None = None,
+    report: Callable[[float, str], None] | None = None,
+) -> tuple[Layers, dict[str, Any]]:
+    """The layers of one view, each `(H, W, C)`, and the facts of its header.
+
+    The reference resumes from the file `state`, where that is given and exists. `report` hears
+    the share done and the standard error.
+    """
+    tracer = Tracer.of(scene, camera, settings.width, settings.height)
+
+    def seed(layer: str) -> int:
+        return stream_seed(settings.seed, layer)
+
+    layers: Layers = dict(tracer.guides)
+    layers["ao"] = tracer.occlusion(settings.ao_rays, ao_distance, seed("ao"))
+    mask = layers["mask"] > 0
+    layers["direct"] = mask * tracer.direct(settings.direct_spp, seed("direct"))
+    layers["direct"] /= settings.direct_spp
+    for name, spp in noisy_names(settings).items():
+        total = tracer.indirect(spp, seed(name), None, settings.bounces, settings.mis)
+        layers[name] = mask * total / spp
+    reference = Accumulator.of(tracer, settings, seed("reference"), mask[..., 0], state)
+    reference.run(settings.goal, report)
+    layers["reference"], layers["reference_a"] = reference.mean(), reference.first_half()
+    facts = {
+        "reference_spp": reference.spp,
+        "reference_seconds": round(reference.seconds, 1),
+        "reference_median_relative_standard_error": round(reference.relative_error(), 5),
+        "reference_samples_per_second": round(reference.samples_per_second()),
+    }
+    return layers, header(camera, settings, ao_distance) | facts
+
+
+def header(camera: Camera, settings: Settings, ao_distance: float) -> dict[str, Any]:
+    """What the EXR's header says of a frame, but for its scene and its reference."""
+    return {
+        "width": settings.width,
+        "height": settings.height,
+        "seed": settings.seed,
+        "bounces": settings.bounces,
+        "direct_spp": settings.direct_spp,
+        "ao_distance": float(ao_distance),
+        "camera_to_world": camera.to_world.tolist(),
+        "fov_x_degrees": camera.fov_x,
+        "sampling": "next-event estimation" + (" + MIS" if settings.mis else " only"),
+        "renderer": f"mitsuba {mi.__version__}, jflnr renderer {RENDERER}",
+    }
+
+
+def write(path: Path, layers: Layers, facts: dict[str, Any], leave_out: tuple[str, ...] = ()) -> None:
+    """Write a frame as EXR, atomically: depth in float, the rest in half."""
+    largest = float(np.finfo(np.float16).max)
+    channels = {}
+    for name, picture in layers.items():
+        if name in leave_out:
+            continue
+        kind = np.float32 if name in SINGLE else np.float16
+        for i, axis in enumerate(AXES.get(name, "RGB")):
+            channels[f"{name}.{axis}"] = np.clip(picture[..., i], -largest, largest).astype(kind)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_channels(path, channels, json.dumps(facts))

@@ -1,0 +1,155 @@
+"""The converged layer: accumulated in float64, resumable, with a measure of its own noise.
+
+Four replicates are summed, each a scrambled (0,2)-sequence of its own. The first two make
+`reference_a`. The spread of the four gives the standard error, which randomised sequences allow
+and which a variance over their (dependent) samples would overstate.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from experiments.render.sampling import stream_seed
+from experiments.render.tracer import Tracer
+
+if TYPE_CHECKING:
+    from experiments.render.frame import Settings
+
+REPLICATES = 4
+SAVE_EVERY = 60.0  # seconds
+
+
+@dataclass(frozen=True)
+class Goal:
+    """When a reference is good enough: at this median relative standard error, or at a bound."""
+
+    error: float = 0.03
+    least_spp: int = 256
+    most_spp: int = 1 << 17
+    seconds: float = 1200.0
+
+
+@dataclass
+class Accumulator:
+    """`sums` is `(4, H, W, 3)` float64, of `spp / 4` samples each; `mask` is `(H, W)` bool."""
+
+    tracer: Tracer
+    settings: Settings
+    seed: int
+    mask: NDArray[np.bool_]
+    state: Path | None
+    sums: NDArray[np.float64]
+    spp: int = 0
+    seconds: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        tracer: Tracer,
+        settings: Settings,
+        seed: int,
+        mask: NDArray[np.bool_],
+        state: Path | None = None,
+    ) -> Accumulator:
+        """A new one, or the one saved in `state` where that fits."""
+        sums = np.zeros((REPLICATES, tracer.height, tracer.width, 3))
+        made = cls(tracer, settings, seed, mask, state, sums)
+        if state is not None and state.exists():
+            saved = np.load(state)
+            if str(saved["key"]) == made._key() and saved["sums"].shape == sums.shape:
+                made.sums, made.spp = saved["sums"], int(saved["spp"])
+                made.seconds = float(saved["seconds"])
+        return made
+
+    def _key(self) -> str:
+        """What must agree for a saved state to be continued."""
+        s = self.settings
+        position = float(np.float64(self.tracer.guides["position"]).sum())
+        return f"{self.seed}/{s.bounces}/{s.mis}/{position!r}"
+
+    def run(self, goal: Goal, report: Callable[[float, str], None] | None = None) -> None:
+        """Sample until the goal is met; saves its state on the way."""
+        saved = time.monotonic()
+        while not self.enough(goal):
+            self._step(goal)
+            if report:
+                report(self.share(goal), f"{self.spp} spp, error {self.relative_error():.3f}")
+            if self.state is not None and time.monotonic() - saved > SAVE_EVERY:
+                self.save()
+                saved = time.monotonic()
+        if self.state is not None:
+            self.state.unlink(missing_ok=True)
+
+    def enough(self, goal: Goal) -> bool:
+        """Whether the error is small, or a bound on samples or time is reached."""
+        if self.spp < goal.least_spp:
+            return False
+        bound = self.spp >= goal.most_spp or self.seconds >= goal.seconds
+        return bound or self.relative_error() <= goal.error
+
+    def share(self, goal: Goal) -> float:
+        """About how much of the work is done: the error falls as one over the root of samples."""
+        if self.spp < goal.least_spp:
+            return self.spp / goal.least_spp * 0.5
+        by_error = (goal.error / max(self.relative_error(), 1e-9)) ** 2
+        return min(1.0, max(by_error, self.seconds / goal.seconds, self.spp / goal.most_spp))
+
+    def _step(self, goal: Goal) -> None:
+        """A quarter more samples (at least 16, at most 256) to each replicate."""
+        each = self.spp // REPLICATES
+        more = int(np.clip(each // 4, 16, 256)) // 16 * 16
+        start = time.monotonic()
+        for i in range(REPLICATES):
+            seed = stream_seed(self.seed, i)
+            s = self.settings
+            self.sums[i] += self.tracer.indirect(more, seed, each, s.bounces, s.mis)
+        self.seconds += time.monotonic() - start
+        self.spp += REPLICATES * more
+
+    def mean(self) -> NDArray[np.float64]:
+        """The reference `(H, W, 3)`."""
+        return self.mask[..., None] * self.sums.sum(0) / self.spp
+
+    def first_half(self) -> NDArray[np.float64]:
+        """The mean of the first two replicates `(H, W, 3)`."""
+        half = REPLICATES // 2
+        return self.mask[..., None] * self.sums[:half].sum(0) / (self.spp / 2)
+
+    def variance(self) -> NDArray[np.float64]:
+        """Variance of the mean's luminance `(H, W)`: three degrees of freedom a pixel."""
+        means = self.sums.mean(-1) / (self.spp / REPLICATES)
+        return means.var(0, ddof=1) / REPLICATES
+
+    def relative_error(self) -> float:
+        """Median over the mask of standard error over mean, variances pooled over 3 x 3 pixels."""
+        if not self.mask.any():
+            return 0.0
+        mean = self.mean().mean(-1)
+        weight = uniform_filter(self.mask.astype(float), 3, mode="constant")
+        pooled = uniform_filter(self.mask * self.variance(), 3, mode="constant")
+        with np.errstate(invalid="ignore", divide="ignore"):
+            relative = np.sqrt(pooled / weight)[self.mask] / mean[self.mask]
+        return float(np.median(np.where(mean[self.mask] > 0, relative, 1.0)))
+
+    def samples_per_second(self) -> float:
+        """Indirect samples of all pixels a second."""
+        pixels = self.tracer.width * self.tracer.height
+        return self.spp * pixels / max(self.seconds, 1e-9)
+
+    def save(self) -> None:
+        """Write the state, atomically."""
+        assert self.state is not None
+        self.state.parent.mkdir(parents=True, exist_ok=True)
+        beside = self.state.with_suffix(".tmp.npz")
+        content: dict[str, Any] = {"sums": self.sums, "spp": self.spp, "seconds": self.seconds}
+        np.savez(beside, key=self._key(), **content)
+        os.replace(beside, self.state)

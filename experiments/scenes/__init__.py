@@ -1,0 +1,1 @@
+"""Scenes of this project: geometry, textures and lights made by functions of a seed."""

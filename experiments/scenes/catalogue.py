@@ -1,0 +1,37 @@
+"""All families of scenes, by name: each a function of a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from experiments.scenes import forms, nature, passages, rooms
+from experiments.scenes.room import room
+from experiments.scenes.world import World
+
+FAMILIES: dict[str, Callable[[int], World]] = {
+    "furnished": rooms.furnished,
+    "corridor": passages.corridor,
+    "colonnade": passages.colonnade,
+    "stairs": passages.stairs,
+    "shelves": rooms.shelves,
+    "foliage": nature.foliage,
+    "forms": forms.forms,
+    "terrain": nature.terrain,
+    "cave": nature.cave,
+    "hall": passages.hall,
+    "lamps": rooms.lamps,
+}
+
+
+def world_of(name: str) -> World:
+    """The scene `room`, or `FAMILY-SEED`, such as `stairs-3`.
+
+    Raises ValueError for an unknown name.
+    """
+    family, _, seed = name.partition("-")
+    if name == "room":
+        return room()
+    if family not in FAMILIES or not seed.isdigit():
+        known = ", ".join(f"{f}-SEED" for f in FAMILIES)
+        raise ValueError(f"there is no scene {name!r} of ours: use room, {known}")
+    return FAMILIES[family](int(seed))
