@@ -53,6 +53,11 @@ def make_frame(height: int = 24, width: int = 40, seed: int = 0) -> Frame:
 
 
 @pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(1)
+
+
+@pytest.fixture
 def frame() -> Frame:
     return make_frame()
 
