@@ -105,55 +105,59 @@ def _attempt(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) 
     try:
         return record | {"status": "written"} | _denoise(job, settings, arguments)
     except INPUT_ERRORS as error:
-        return record | {"status": "failed", "error": sentence(error)}
+        text = sentence(error)
+        named = any(str(path) in text for path in (job.source, *outputs, job.target.parent))
+        text = text if named else f"{job.source}: {text}"
+        return record | {"status": "failed", "error": text}
 
 
 def _denoise(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
-    from jflnr import exr
-    from jflnr.cli.preview import write_preview
     from jflnr.denoising import denoise
-    from jflnr.frame import composite, read_frame, read_header
-    from jflnr.metrics import exposure, measure
+    from jflnr.frame import read_frame
+    from jflnr.metrics import measure
 
     frame = read_frame(job.source, arguments.spp)
     if arguments.reference and frame.reference is None:
         raise ValueError(f"{job.source}: --reference needs a layer reference, and there is none")
+    job.target.parent.mkdir(parents=True, exist_ok=True)
     start = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         indirect = np.asarray(denoise(frame, **settings))
     seconds = time.perf_counter() - start
-    picture = np.asarray(composite(frame, indirect))
     about = _about(frame, settings, arguments.spp)
-
-    job.target.parent.mkdir(parents=True, exist_ok=True)
-    if arguments.png:
-        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        lit = composite(dataclasses.replace(frame, emission=None), indirect)
-        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
-    exr.write_channels(
-        job.target,
-        {
-            f"{layer}{c}": image[..., i]
-            for layer, image in (("indirect.", indirect), ("", picture))
-            for i, c in enumerate("RGB")
-        },
-        json.dumps(read_header(job.source) | {"denoiser": about}),
-        exr.read_attributes(job.source).window,
-    )
+    _write(job, frame, indirect, about, png=arguments.png)
     record = {
-        "width": picture.shape[1],
-        "height": picture.shape[0],
+        "width": indirect.shape[1],
+        "height": indirect.shape[0],
         **about,
         "seconds": seconds,
         "warnings": [*(str(warning.message) for warning in caught), *_not_finite(frame)],
     }
     if arguments.reference:
-        record["metrics"] = {
-            "noisy": measure(frame, frame.indirect),
-            "denoised": measure(frame, indirect),
-        }
+        noisy, denoised = measure(frame, frame.indirect), measure(frame, indirect)
+        record["metrics"] = {"noisy": noisy, "denoised": denoised}
     return record
+
+
+def _write(
+    job: Job, frame: "Frame", indirect: np.ndarray, about: dict[str, Any], png: bool
+) -> None:
+    """Write the preview, if asked for, and the EXR, with the input's header and windows."""
+    from jflnr import exr
+    from jflnr.cli.preview import write_preview
+    from jflnr.frame import composite, read_header
+    from jflnr.metrics import exposure
+
+    picture = np.asarray(composite(frame, indirect))
+    if png:
+        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
+        lit = composite(dataclasses.replace(frame, emission=None), indirect)
+        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
+    channels = {f"indirect.{c}": indirect[..., i] for i, c in enumerate("RGB")}
+    channels |= {c: picture[..., i] for i, c in enumerate("RGB")}
+    comments = json.dumps(read_header(job.source) | {"denoiser": about})
+    exr.write_channels(job.target, channels, comments, exr.read_attributes(job.source).window)
 
 
 def _about(frame: "Frame", settings: dict[str, Any], spp: int) -> dict[str, Any]:

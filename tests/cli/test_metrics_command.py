@@ -1,0 +1,70 @@
+"""`jflnr metrics A [B]`: which files may stand on either side."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jflnr import exr, metrics
+from jflnr.cli import main
+from jflnr.frame import Frame
+
+
+def measured(capsys: pytest.CaptureFixture[str], *argv: object) -> dict:
+    assert main(["metrics", *map(str, argv), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def write(path: Path, layer: str, image: np.ndarray) -> Path:
+    exr.write_channels(path, {f"{layer}{c}": image[..., i] for i, c in enumerate("RGB")})
+    return path
+
+
+def test_a_frame_against_its_own_reference(
+    frame: Frame, frame_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert measured(capsys, frame_file) == metrics.measure(frame, frame.indirect)
+
+
+def test_denoised_light_against_a_frame(
+    tmp_path: Path, frame: Frame, frame_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    light = np.asarray(frame.reference) * np.float32(1.1)
+    a = write(tmp_path / "a.exr", "indirect.", light)
+    assert measured(capsys, a, frame_file) == metrics.measure(frame, light)
+
+
+def test_plain_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    x = np.random.default_rng(0).random((9, 8, 3)).astype(np.float32)
+    a, b = write(tmp_path / "a.exr", "", 0.5 * x), write(tmp_path / "b.exr", "", x)
+    values = measured(capsys, a, b)
+    assert values["smape"] == pytest.approx(1 / 3, rel=1e-6)
+    assert "mse_unbiased" not in values
+
+
+def test_an_infinite_psnr_is_null_in_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a = write(tmp_path / "a.exr", "", np.ones((9, 8, 3), np.float32))
+    assert measured(capsys, a)["psnr"] is None
+
+
+def test_table(frame_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", str(frame_file)]) == 0
+    heading, values = capsys.readouterr().out.splitlines()
+    assert heading.split()[:2] == ["PSNR", "dB"]
+    assert values.startswith("frame.exr")
+
+
+def test_errors(tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small = write(tmp_path / "small.exr", "indirect.", np.ones((3, 4, 3), np.float32))
+    for argv, message in [
+        ((small, frame_file), "indirect is 4 x 3, reference is 40 x 24"),
+        ((small, small), "nothing to compare"),
+        ((frame_file, frame_file, "--spp", "4"), "there is indirect light for spp 1"),
+        ((tmp_path / "gone.exr", frame_file), "there is no such file"),
+    ]:
+        assert main(["metrics", *map(str, argv)]) == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1
