@@ -1,4 +1,4 @@
-"""Learning sigma, eps and eps' on frames with a reference, by gradient through the whole denoiser."""
+"""Learning sigma, eps and eps' on frames with a reference, by gradient through the denoiser."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.solve import solve
 from jflnr.frame import Frame
 
-# Three times the widest window that is worth fitting.
+# How far the window reaches while it is fitted, pixels: three times the widest worth having.
 SUPPORT = 96
 
 
@@ -70,7 +70,9 @@ def fit(
         losses = [_smape_and_gradient(example, parameters, block) for example in examples]
         return jax.tree.map(lambda *values: sum(values) / len(values), *losses)
 
-    solver = jaxopt.LBFGS(mean_smape, value_and_grad=True, jit=False, maxiter=steps, tol=1e-5)
+    solver = jaxopt.LBFGS(
+        mean_smape, value_and_grad=True, jit=False, linesearch="backtracking", maxls=6, tol=1e-4
+    )
     parameters = jax.tree.map(jnp.asarray, initial)
     state = solver.init_state(parameters)
     before = float(state.value)

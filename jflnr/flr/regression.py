@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import jax
 
+from jflnr import checks
 from jflnr.flr.apply import apply
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.blur import blur
 from jflnr.flr.moments import Guides, centre, collect
 from jflnr.flr.parameters import Parameters
-from jflnr.flr.solve import Solver, solve
+from jflnr.flr.solve import SOLVERS, Solver, solve
 
 
 def flr(
@@ -41,6 +42,7 @@ def flr(
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
+    checks.choice("solver", solver, SOLVERS)
     factor = check_regression(target, guides, guides_map, weight, block, support)
     shift = centre(guides)
     moments = collect(target, guides, shift, block, weight)

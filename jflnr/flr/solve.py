@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -41,11 +41,14 @@ def solve(
     means = moments * jnp.where(filled, 1 / jnp.where(filled, n, 1), 0)
 
     # Eq. 13 and 15, about the shift.
-    pairs = [[index_xx(i + 1, j + 1) for j in range(count)] for i in range(count)]
-    cross = [[index_xy(i + 1, c, count, channels) for c in range(channels)] for i in range(count)]
-    mean_x = _pick(means, [index_xx(i + 1, 0) for i in range(count)])
-    mean_y = _pick(means, [index_xy(0, c, count, channels) for c in range(channels)])
-    covariance = _pick(means, pairs) - mean_x[:, None] * mean_x
+    first = np.array([index_xx(i + 1, 0) for i in range(count)], int)
+    pairs = np.array([index_xx(i + 1, j + 1) for i, j in np.ndindex(count, count)], int)
+    cross = np.array(
+        [index_xy(i + 1, c, count, channels) for i, c in np.ndindex(count, channels)], int
+    )
+    mean_x = means[first]
+    mean_y = means[index_xy(0, 0, count, channels) :][:channels]
+    covariance = means[pairs.reshape(count, count)] - mean_x[:, None] * mean_x
 
     # Eq. 18; rounding can leave a flat guide's variance just below zero.
     diagonal = jnp.eye(count, dtype=bool)[:, :, None, None]
@@ -57,19 +60,12 @@ def solve(
     # Eq. 19 to 22, with a unit diagonal before eps' is added.
     scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)])) if count else mean_x
     correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)
-    right = (_pick(means, cross) - mean_x[:, None] * mean_y) * scale[:, None]
+    right = (means[cross.reshape(count, channels)] - mean_x[:, None] * mean_y) * scale[:, None]
     slopes = SOLVERS[solver](correlation, right) * scale[:, None]
 
     # Eq. 23 as an affine function of X - shift.
     value = mean_y - jnp.sum(mean_x[:, None] * slopes, axis=0)
     return jnp.concatenate([value[None], slopes])
-
-
-def _pick(planes: jax.Array, indices: list[Any]) -> jax.Array:
-    """Planes by their numbers: `(K, h, w)` to `(*shape of indices, h, w)`."""
-    table = np.array(indices, int)
-    shape = table.shape if table.size else (0, *table.shape[1:])
-    return planes[table.reshape(-1)].reshape(*shape, *planes.shape[1:])
 
 
 def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
