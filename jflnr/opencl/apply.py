@@ -1,0 +1,36 @@
+"""Host side of kernels_cl/apply.cl; its twin in JAX is jflnr/flr/apply.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jflnr.opencl.context import Context
+from jflnr.opencl.moments import guide_arguments, guide_defines
+
+
+def apply(
+    context: Context,
+    model: Any,
+    guides: tuple[Any, ...],
+    shift: Any,
+    step: int,
+    size: tuple[int, int],
+    output: Any,
+) -> None:
+    """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
+
+    model: `(Q + 1, C, h, pitch)`, from `solve`. guides: each `(H, W, Q_i)`. shift: `(max(Q, 1),)`.
+    step: distance of the models in pixels. size: blocks down and across, `(h, w)`. output:
+    `(H, W, C)`, float32 or float16, is written.
+    """
+    height, width, channels = output.shape
+    h, w = size
+    lanes = context.width(step)
+    defines = {**guide_defines(guides, channels), "STEP": step, "WIDTH": lanes}
+    if output.dtype == "float16":
+        defines["HALF_OUTPUT"] = 1
+    arguments = (
+        width, height, h, w, model.shape[3], model, *guide_arguments(guides), shift, output
+    )  # fmt: skip
+    strips = (w + 1) * -(-step // lanes)
+    context.run("apply", "apply.cl", defines, (strips, h + 1), arguments)

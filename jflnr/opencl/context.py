@@ -1,0 +1,151 @@
+"""What is kept between frames on one device: queue, programs, buffers, and the times of kernels."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jflnr.opencl import devices
+
+
+class Launch(NamedTuple):
+    """One execution of a kernel: its event, and the bytes it must at least read and write."""
+
+    kernel: str
+    event: Any
+    bytes: int
+
+
+class Context:
+    """A device, its queue, compiled programs, a pool of buffers and, on request, a profile.
+
+    device: a `pyopencl.Device`, its number or a part of its name (see `jflnr devices`), or None
+    for the best one. work_group: number of work-items in x of a work-group; results do not depend
+    on it. Raises `NoDevice` or `ValueError`.
+    """
+
+    def __init__(self, device: Any = None, *, work_group: int | None = None) -> None:
+        self.cl = cl = devices.pyopencl()
+        named = device is None or isinstance(device, str | int)
+        self.device = devices.choose(device) if named else device
+        # A processor shares its memory with numpy: arrays are used where they lie.
+        self.on_cpu = bool(self.device.type & cl.device_type.CPU)
+        self.context = cl.Context([self.device])
+        self.queue = cl.CommandQueue(
+            self.context, properties=cl.command_queue_properties.PROFILING_ENABLE
+        )
+        self.pool = cl.tools.MemoryPool(cl.tools.ImmediateAllocator(self.queue))
+        self.work_group = work_group or (32 if self.on_cpu else 64)
+        self.launches: list[Launch] | None = None
+        self._kernels: dict[tuple[Any, ...], Any] = {}
+
+    def width(self, block: int | None = None) -> int:
+        """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given."""
+        if not self.on_cpu:
+            return 1
+        return next(n for n in (8, 4, 1) if block is None or block % n == 0)
+
+    def run(
+        self,
+        name: str,
+        file: str,
+        defines: dict[str, int],
+        size: Sequence[int],
+        arguments: Sequence[Any],
+    ) -> None:
+        """Enqueue kernel `name` of kernels_cl/`file`; `size` is padded to whole work-groups.
+
+        arguments: ints and floats are passed as int and float, arrays as their buffers.
+        """
+        local = (self.work_group, *(1 for _ in size[1:]))
+        padded = tuple(math.ceil(n / m) * m for n, m in zip(size, local, strict=True))
+        event = self._kernel(name, file, defines)(
+            self.queue, padded, local, *map(_argument, arguments)
+        )
+        if self.launches is not None:
+            arrays = {id(a): a.nbytes for a in arguments if hasattr(a, "nbytes")}
+            self.launches.append(Launch(name, event, sum(arrays.values())))
+
+    def empty(self, shape: Sequence[int], dtype: Any = np.float32) -> Any:
+        """An uninitialised device array, from memory that earlier frames have given back."""
+        return self.cl.array.empty(self.queue, tuple(shape), dtype, allocator=self.pool)
+
+    def array(self, values: Any, writable: bool = False) -> Any:
+        """A device array of a numpy array; on a processor the same memory, which must stay alive.
+
+        Device arrays are passed through.
+        """
+        if is_device_array(values):
+            return values
+        if not self.on_cpu:
+            return self.cl.array.to_device(self.queue, values, allocator=self.pool)
+        flags = self.cl.mem_flags
+        access = flags.READ_WRITE if writable else flags.READ_ONLY
+        buffer = self.cl.Buffer(self.context, access | flags.USE_HOST_PTR, hostbuf=values)
+        return self.cl.array.Array(self.queue, values.shape, values.dtype, data=buffer)
+
+    def finish(self, output: Any, result: Any) -> Any:
+        """Make the device array `output` readable as `result`, a numpy array or `output` itself."""
+        if self.on_cpu:
+            self.queue.finish()  # also since the inputs may go away with the caller's arrays
+        if output is not result and not self.on_cpu:
+            output.get(ary=result)
+        elif output is not result:
+            # The same memory; a map tells OpenCL that the host is going to look at it.
+            access = self.cl.map_flags.READ
+            mapped, _ = self.cl.enqueue_map_buffer(
+                self.queue, output.base_data, access, 0, output.shape, output.dtype
+            )
+            mapped.base.release(self.queue)
+        return result
+
+    def _kernel(self, name: str, file: str, defines: dict[str, int]) -> Any:
+        key = (name, file, *sorted(defines.items()))
+        if key not in self._kernels:
+            options = [f"-D{define}={value}" for define, value in defines.items()]
+            program = self.cl.Program(self.context, source(file)).build(options)
+            for kernel in program.all_kernels():
+                self._kernels[(kernel.function_name, *key[1:])] = kernel
+        return self._kernels[key]
+
+
+def is_device_array(values: Any) -> bool:
+    """True for a `pyopencl.array.Array`, without a need for pyopencl to be there."""
+    return hasattr(values, "base_data")
+
+
+def _argument(value: Any) -> Any:
+    if isinstance(value, int):
+        return np.int32(value)
+    if isinstance(value, float):
+        return np.float32(value)
+    return None if value is None else value.data
+
+
+@functools.cache
+def source(file: str) -> str:
+    """The text of a kernel file with its headers in place, so that no include path is needed."""
+    lines = (_folder() / file).read_text().splitlines()
+    include = "#include "
+    return "\n".join(
+        source(line.removeprefix(include).strip('"')) if line.startswith(include) else line
+        for line in lines
+    )
+
+
+def _folder() -> Any:
+    """`jflnr/kernels_cl` where the package is installed, `kernels_cl` in the repository."""
+    installed = resources.files("jflnr") / "kernels_cl"
+    return installed if installed.is_dir() else Path(__file__).parents[2] / "kernels_cl"
+
+
+@functools.cache
+def default_context() -> Context:
+    """The best device, set up once."""
+    return Context()

@@ -1,0 +1,62 @@
+"""The OpenCL devices of this machine, and the choice of one."""
+
+from __future__ import annotations
+
+import os
+from types import ModuleType
+from typing import Any
+
+ADVICE = (
+    "install an OpenCL driver, or PoCL, which runs on the processor: pip install 'jflnr[opencl]'"
+)
+KINDS = ("GPU", "ACCELERATOR", "CPU", "CUSTOM")
+
+
+class NoDevice(ImportError):
+    """There is no OpenCL device, or no pyopencl, here."""
+
+
+def pyopencl() -> ModuleType:
+    """The module, or `NoDevice` that says how to get it."""
+    os.environ.setdefault("PYOPENCL_NO_CACHE", "1")  # drivers have a cache of their own
+    try:
+        import pyopencl
+        import pyopencl.array
+        import pyopencl.tools
+    except ImportError as error:
+        raise NoDevice(f"The opencl backend needs pyopencl ({error}); {ADVICE}") from None
+    return pyopencl
+
+
+def devices() -> list[Any]:
+    """All devices, best kind first, as `pyopencl.Device`; `NoDevice` if there is none."""
+    cl = pyopencl()
+    try:
+        found = [device for platform in cl.get_platforms() for device in platform.get_devices()]
+    except cl.Error:
+        found = []  # the loader's way to say that no driver is installed
+    if not found:
+        raise NoDevice(f"No OpenCL device was found; {ADVICE}")
+    return sorted(found, key=lambda device: KINDS.index(kind(device)))
+
+
+def kind(device: Any) -> str:
+    """One of `KINDS`."""
+    types = pyopencl().device_type
+    return next((name for name in KINDS if device.type & getattr(types, name)), "CUSTOM")
+
+
+def choose(name: str | int | None = None) -> Any:
+    """A device by its number in `devices()` or a part of its or its platform's name; else the best.
+
+    Raises `ValueError` if there is none of that name, `NoDevice` if there is none at all.
+    """
+    found = devices()
+    if name is None:
+        return found[0]
+    for number, device in enumerate(found):
+        label = f"{device.platform.name} {device.name}"
+        if str(name) == str(number) or (not str(name).isdigit() and str(name).lower() in label.lower()):
+            return device
+    listed = ", ".join(f"{i}: {device.name.strip()}" for i, device in enumerate(found))
+    raise ValueError(f"There is no OpenCL device {name!r}; there are {listed}")

@@ -1,0 +1,75 @@
+"""Host side of kernels_cl/moments.cl; its twin in JAX is jflnr/flr/moments.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jflnr.flr.moments import plane_count
+from jflnr.opencl.context import Context
+
+PARTS = 5
+
+
+def guide_defines(guides: tuple[Any, ...], channels: int) -> dict[str, int]:
+    """The defines of kernels_cl/sizes.h and images.h for guides `(H, W, Q_i)`, at most five."""
+    parts = [layer.shape[2] for layer in guides] + [0] * (PARTS - len(guides))
+    defines = {f"PART_{i}": count for i, count in enumerate(parts)}
+    if any(layer.dtype == "float16" for layer in guides):
+        defines["HALF_GUIDES"] = 1
+    return {"Q": sum(parts), "C": channels, **defines}
+
+
+def guide_arguments(guides: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The guides as the kernels take them."""
+    return (*guides, *(None for _ in range(PARTS - len(guides))))
+
+
+def centre(context: Context, guides: tuple[Any, ...]) -> Any:
+    """A typical value of each guide, `(max(Q, 1),)`, from a sparse grid of pixels.
+
+    guides: device arrays `(H, W, Q_i)`.
+    """
+    defines = {**guide_defines(guides, 1), "WIDTH": 1, "BLOCK": 1}
+    count = defines["Q"]
+    shift = context.empty((max(count, 1),))
+    if count == 0:
+        return shift
+    height, width = guides[0].shape[:2]
+    step_y, step_x = (max(size // 32, 1) for size in (height, width))
+    rows = -(-height // step_y)
+    partial = context.empty((rows, count, 2))
+    arguments = (width, rows, step_x, step_y, *guide_arguments(guides), partial)
+    context.run("centre_rows", "moments.cl", defines, (rows,), arguments)
+    context.run("centre", "moments.cl", defines, (count,), (rows, partial, shift))
+    return shift
+
+
+def collect(
+    context: Context,
+    target: Any,
+    guides: tuple[Any, ...],
+    shift: Any,
+    block: int,
+    weight: Any | None = None,
+) -> Any:
+    """Mean over each block of the outer products of [1, X - shift, Y] (section 3.2, kernel 1).
+
+    target: `(H, W, C)`. guides: each `(H, W, Q_i)`. shift: from `centre`. weight: `(H, W)`,
+    float32 or bool, or None. All are device arrays.
+    Returns `(K, ceil(H/block), pitch)`, zero from column ceil(W/block) on.
+    """
+    height, width, channels = target.shape
+    defines = {**guide_defines(guides, channels), "BLOCK": block, "WIDTH": context.width(block)}
+    if target.dtype == "float16":
+        defines["HALF_TARGET"] = 1
+    if weight is not None:
+        defines["MASKED" if weight.dtype == bool else "WEIGHTED"] = 1
+        defines["WEIGHTED"] = 1
+    h, w = -(-height // block), -(-width // block)
+    pitch = -(-w // context.width()) * context.width()
+    moments = context.empty((plane_count(defines["Q"], channels), h, pitch))
+    arguments = (
+        width, height, h, pitch, target, *guide_arguments(guides), weight, shift, moments
+    )  # fmt: skip
+    context.run("moments", "moments.cl", defines, (pitch, h), arguments)
+    return moments

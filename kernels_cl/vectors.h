@@ -1,0 +1,61 @@
+// Vectors of neighbours, for every kernel.
+//
+// Define: WIDTH, the neighbours in x that one work-item handles together: 1 for a GPU, 4 or 8 for a
+// CPU, whose vector registers then fill without any help from the compiler.
+
+#if !defined(WIDTH) || (WIDTH != 1 && WIDTH != 4 && WIDTH != 8)
+#error "WIDTH, the neighbours per work-item, must be 1, 4 or 8"
+#endif
+
+#define INLINE inline __attribute__((always_inline))
+
+// Not the built-in min, clamp, select, vload and so on in inner loops: PoCL calls a function for
+// each of those, and nothing stays in registers across a call.
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+#define CLAMP(i, low, high) ((i) < (low) ? (low) : (i) > (high) ? (high) : (i))
+
+// A `real` is a vector of WIDTH neighbours. LANES(type, f) builds one from f(0), f(1), ...;
+// LANE(v, n) is lane n, a constant, of one.
+#if WIDTH == 1
+typedef float real;
+typedef int mask;
+typedef uint bits;
+#define LANES(type, f) f(0)
+#define LANE(v, n) (v)
+#define AS_BITS as_uint
+#define AS_REAL as_float
+INLINE float lane_sum(real v) { return v; }
+#elif WIDTH == 4
+typedef float4 real;
+typedef int4 mask;
+typedef uint4 bits;
+#define LANES(type, f) ((type)(f(0), f(1), f(2), f(3)))
+#define LANE(v, n) ((n) == 0 ? (v).s0 : (n) == 1 ? (v).s1 : (n) == 2 ? (v).s2 : (v).s3)
+#define AS_BITS as_uint4
+#define AS_REAL as_float4
+INLINE float lane_sum(real v) { return (v.s0 + v.s1) + (v.s2 + v.s3); }
+#else
+typedef float8 real;
+typedef int8 mask;
+typedef uint8 bits;
+#define LANES(type, f) ((type)(f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)))
+#define LANE(v, n)                                                                              \
+    ((n) == 0 ? (v).s0 : (n) == 1 ? (v).s1 : (n) == 2 ? (v).s2 : (n) == 3 ? (v).s3 : (n) == 4 ? \
+     (v).s4 : (n) == 5 ? (v).s5 : (n) == 6 ? (v).s6 : (v).s7)
+#define AS_BITS as_uint8
+#define AS_REAL as_float8
+INLINE float lane_sum(real v)
+{
+    const float4 half_sum = v.lo + v.hi;
+    const float2 pair = half_sum.lo + half_sum.hi;
+    return pair.x + pair.y;
+}
+#endif
+
+#define LANE_NUMBER(i) (i)
+
+// WIDTH neighbouring floats, at any address.
+typedef real unaligned_real __attribute__((aligned(4)));
+#define READ(p) (*(global const unaligned_real *)(p))
+#define WRITE(v, p) (*(global unaligned_real *)(p) = (v))
