@@ -62,8 +62,9 @@ def read_attributes(path: PathLike) -> Attributes:
     header = parts[0].header
     (x0, y0), _ = header["dataWindow"]
     low, high = header["displayWindow"]
+    comments = header.get("comments")
     return Attributes(
-        comments=str(header.get("comments", "")),
+        comments=comments if isinstance(comments, str) else "",
         compression=header["compression"].name.removesuffix("_COMPRESSION"),
         parts=len(parts),
         window=Window((int(x0), int(y0)), (int(low[0]), int(low[1]), int(high[0]), int(high[1]))),

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jflnr.cli.common import INPUT_ERRORS, guide_names, metrics_table, sentence, to_json
-from jflnr.cli.jobs import Job, plan
+from jflnr.cli.jobs import Job, make_folder, plan
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
@@ -106,7 +106,7 @@ def _attempt(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) 
         return record | {"status": "written"} | _denoise(job, settings, arguments)
     except INPUT_ERRORS as error:
         text = sentence(error)
-        named = any(str(path) in text for path in (job.source, *outputs, job.target.parent))
+        named = any(str(path) in text for path in (job.source, *outputs))
         text = text if named else f"{job.source}: {text}"
         return record | {"status": "failed", "error": text}
 
@@ -119,7 +119,7 @@ def _denoise(job: Job, settings: dict[str, Any], arguments: argparse.Namespace) 
     frame = read_frame(job.source, arguments.spp)
     if arguments.reference and frame.reference is None:
         raise ValueError(f"{job.source}: --reference needs a layer reference, and there is none")
-    job.target.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(job.target)
     start = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jflnr.cli.common import guide_names
-from jflnr.cli.jobs import expand
+from jflnr.cli.jobs import expand, make_folder
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     frames = [_read(file, arguments.spp) for file in expand(arguments.frames)]
     guides = choose(frames[0], arguments.guides)
     block = BLOCK if arguments.block is None else arguments.block
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(arguments.output)
     print(f"fitting on {len(frames)} frames with the guides {', '.join(guides) or '(none)'}")
     result = fit(frames, guides=guides, block=block, steps=arguments.steps, progress=_progress)
     save_parameters(

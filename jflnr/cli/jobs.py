@@ -46,6 +46,14 @@ def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
     return jobs
 
 
+def make_folder(target: Path) -> None:
+    """Make the folder that `target` goes to, so that a wrong one is known before any work."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"{target} cannot be written: {error.filename}: {error.strerror}") from None
+
+
 def _check_apart(jobs: Sequence[Job]) -> None:
     inputs = {job.source.resolve() for job in jobs}
     sources: dict[Path, Path] = {}

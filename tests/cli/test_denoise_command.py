@@ -212,7 +212,7 @@ ERRORS = [
     (("frame.exr", "-o", "out.png"), "OUT must end with .exr or be a folder"),
     (("frame.exr", "-o", "frame.exr"), "OUT would replace an input"),
     (("frame.exr", "frames/a.exr", "frames/../frames/a.exr", "-o", "o"), "would both be written"),
-    (("frame.exr", "-o", "notes.txt/out.exr"), "notes.txt: "),
+    (("frame.exr", "-o", "notes.txt/out.exr"), "notes.txt/out.exr cannot be written"),
     (("frame.exr", "-o", "out.exr", "--method", "magic"), "--method must be one of flr"),
     (("frame.exr", "-o", "out.exr", "--backend", "abacus"), "--backend must be one of jax"),
     (("frame.exr", "-o", "out.exr", "--spp", "4"), "there is indirect light for spp 1"),
