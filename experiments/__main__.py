@@ -9,7 +9,7 @@ from pathlib import Path
 
 from experiments import results
 
-NAMES = ("speed", "parameters", "ablation", "opencl")
+NAMES = ("gain", "speed", "ablation")
 
 
 def main(argv: list[str]) -> int:

@@ -1,6 +1,6 @@
 """Denoising of one-sample path-traced light by Fast Local (Neural) Regression."""
 
-from jflnr.denoising import METHODS, denoise
+from jflnr.denoising import BACKENDS, METHODS, denoise
 from jflnr.flr.parameters import Parameters, load_parameters, save_parameters
 from jflnr.flr.regression import flr
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
@@ -8,6 +8,7 @@ from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 __version__ = "0.1.0"
 
 __all__ = [
+    "BACKENDS",
     "METHODS",
     "Frame",
     "Parameters",

@@ -1,0 +1,1 @@
+"""Other denoisers, each as a call from a frame to denoised, demodulated light."""

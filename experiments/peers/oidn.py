@@ -1,0 +1,54 @@
+"""Intel Open Image Denoise on the CPU, through pyoidn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pyoidn
+
+from jflnr.frame import Frame
+
+QUALITY = {
+    "fast": pyoidn.OIDN_QUALITY_FAST,
+    "balanced": pyoidn.OIDN_QUALITY_BALANCED,
+    "high": pyoidn.OIDN_QUALITY_HIGH,
+}
+
+
+def filter_for(
+    frame: Frame, *, quality: str = "high", clean: bool = False, modulated: bool = False
+) -> Callable[[], np.ndarray]:
+    """A call that denoises the frame; setting up the network is done here, once.
+
+    quality: a key of `QUALITY`. clean: tell OIDN that albedo and normal have no noise, which makes
+    it use a larger network. modulated: feed it `albedo * indirect` and divide afterwards; else it
+    sees the demodulated light, with a white albedo. The call returns `(H, W, 3)`, demodulated.
+    """
+    albedo, normal, noisy = (
+        np.ascontiguousarray(a, np.float32) for a in (frame.albedo, frame.normal, frame.indirect)
+    )
+    colour = np.ascontiguousarray(albedo * noisy) if modulated else noisy
+    # Demodulated light is light on white surfaces.
+    auxiliary = albedo if modulated else np.ones_like(albedo)
+    result = np.zeros_like(colour)
+    device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
+    device.commit()
+    network = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
+    images = {"color": colour, "albedo": auxiliary, "normal": normal, "output": result}
+    for name, image in images.items():
+        network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+    network.set_bool("hdr", True)
+    network.set_bool("cleanAux", clean)
+    network.set_int("quality", QUALITY[quality])
+    network.commit()
+
+    def call() -> np.ndarray:
+        network.execute()
+        if (error := device.get_error()) is not None:
+            raise RuntimeError(f"OIDN: {error}")
+        return np.where(albedo > 1e-3, result / np.maximum(albedo, 1e-3), 0) if modulated else result
+
+    # The arrays and the device must outlive the call.
+    call.owners = (device, network, images)  # type: ignore[attr-defined]
+    return call

@@ -1,0 +1,53 @@
+"""Charts that survive printing and colour blindness."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+
+from jflnr.files import replacing, write_atomically
+
+# Okabe and Ito's colours, told apart also by those who do not see red or green.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+
+
+@contextmanager
+def figure(path: Path, columns: int = 1, size: tuple[float, float] = (5.5, 4)) -> Iterator[Any]:
+    """Axes side by side, written to `path` when the block ends."""
+    shape = (size[0] * columns, size[1])
+    drawing, axes = plt.subplots(1, columns, figsize=shape, layout="constrained")
+    for axis in axes if columns > 1 else [axes]:
+        axis.set_prop_cycle(color=COLOURS)
+        axis.grid(True, which="major", alpha=0.3)
+    yield axes
+    with replacing(path) as beside:
+        drawing.savefig(beside, dpi=130, format=path.suffix[1:])
+    plt.close(drawing)
+
+
+def power_law(axis: Axes, rows: list[dict[str, Any]], key: str, label: str) -> None:
+    """Time against `key` on log axes, with the proportional line through the last point."""
+    x, y = [row[key] for row in rows], [row["ms"] for row in rows]
+    axis.loglog(x, y, "o-", label="measured")
+    axis.loglog(x, [y[-1] * v / x[-1] for v in x], "--", label="proportional")
+    axis.set(xlabel=label, ylabel="milliseconds")
+    axis.legend()
+
+
+def against(axis: Axes, rows: list[dict[str, Any]], key: str, label: str) -> None:
+    """Time against `key` on linear axes from zero."""
+    axis.plot([row[key] for row in rows], [row["ms"] for row in rows], "o-")
+    axis.set(xlabel=label, ylabel="milliseconds", ylim=(0, None))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Text, written whole or not at all."""
+    write_atomically(path, text.encode())
