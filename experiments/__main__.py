@@ -9,7 +9,7 @@ from pathlib import Path
 
 from experiments import results
 
-NAMES = ("gain", "speed", "ablation")
+NAMES = ("picture", "gain", "speed", "ablation")
 
 
 def main(argv: list[str]) -> int:

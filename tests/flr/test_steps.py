@@ -34,7 +34,7 @@ def test_centre_ignores_what_is_not_finite():
     guides = np.full((40, 50, 2), 7.0, np.float32)
     guides[::3, :, 0] = np.nan
     guides[:, :, 1] = np.inf
-    np.testing.assert_allclose(centre(jnp.asarray(guides)), [7, 0], rtol=1e-6)
+    np.testing.assert_allclose(centre(jnp.asarray(guides)), [7, 0], rtol=1e-5)
 
 
 def test_taps_are_a_gaussian_and_vanishing_width_is_the_identity():
@@ -60,7 +60,7 @@ def test_blur_is_the_separable_convolution(rng):
 def adjoint_error(linear, example, rng):
     """|y . A x - A^T y . x| relative to its size."""
     out = jax.eval_shape(linear, example)
-    transpose = jax.linear_transpose(linear, example)
+    _, transpose = jax.vjp(linear, example)
     y = rng.standard_normal(out.shape)
     left = jnp.vdot(y, linear(example))
     right = jnp.vdot(transpose(jnp.asarray(y))[0], example)
