@@ -3,7 +3,6 @@
 They look at static facts only (shapes, types, plain numbers), so they also run while JAX traces.
 """
 
-import math
 from collections.abc import Collection
 from typing import Any
 
@@ -13,12 +12,6 @@ def choice(name: str, value: object, options: Collection[object]) -> None:
     if value not in options:
         listed = ", ".join(str(option) for option in options)
         raise ValueError(f"{name} must be one of {listed}; got {value!r}")
-
-
-def positive(name: str, value: float) -> None:
-    """Raise ValueError unless `value` is a finite number above 0."""
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name} must be a finite number above 0; got {value!r}")
 
 
 def positive_integer(name: str, value: object) -> None:

@@ -21,6 +21,7 @@ from jflnr.files import replacing
 PathLike = str | os.PathLike[str]
 
 COMPONENTS = "RGBAXYZ"
+TYPES = {"float16": "half", "float32": "float", "uint32": "uint"}
 MAGIC = b"\x76\x2f\x31\x01"
 # A small damaged header can announce any size. No real frame packs better than this.
 ALWAYS_ALLOWED_BYTES = 1 << 30
@@ -51,7 +52,7 @@ def layer_of(channel: str) -> str:
 def layers_of(channels: Iterable[str]) -> dict[str, list[str]]:
     """The components of each layer, as people order them: {"normal": ["X", "Y", "Z"]}."""
     layers: dict[str, list[str]] = {}
-    for name in sorted(channels, key=lambda name: (COMPONENTS.find(name[-1]), name)):
+    for name in sorted(channels, key=lambda name: (COMPONENTS.find(name[-1:]), name)):
         layers.setdefault(layer_of(name), []).append(name.rpartition(".")[2])
     return dict(sorted(layers.items()))
 
@@ -89,6 +90,8 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
             layered = "." in name or len(parts) == 1
             channels[name if layered and name not in channels else f"{part.name}.{name}"] = pixels
     _check_sizes(path, channels)
+    if len({tuple(map(int, part.header["dataWindow"][0])) for part in parts}) > 1:
+        raise ValueError(f"{path}: its parts do not start at the same pixel")
     return channels
 
 
@@ -104,6 +107,8 @@ def write_channels(
     """
     path = Path(path)
     _check_sizes(path, channels)
+    if wrong := [f"{n} is {a.dtype}" for n, a in channels.items() if a.dtype.name not in TYPES]:
+        raise TypeError(f"channels must be {', '.join(TYPES)}; {wrong[0]}")
     height, width = next(iter(channels.values())).shape
     (x, y), display = window or Window()
     corners = (x, y, x + width - 1, y + height - 1)

@@ -9,6 +9,11 @@ import pytest
 from jflnr.frame import Frame, write_frame
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
+    config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
+
+
 @pytest.fixture(scope="session")
 def data() -> Path:
     """The folder of real frames; the test is skipped where it is absent."""
@@ -19,10 +24,11 @@ def data() -> Path:
     return folder
 
 
-def make_frame(height: int = 24, width: int = 40, seed: int = 0) -> Frame:
-    """A frame with every layer, whose light is smooth and whose noise is strong."""
-    rng = np.random.default_rng(seed)
-    y, x = np.mgrid[:height, :width].astype(np.float32)[..., None] / width
+@pytest.fixture
+def frame() -> Frame:
+    """A frame of 40 x 24 with every layer, whose light is smooth and whose noise is strong."""
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[:24, :40].astype(np.float32)[..., None] / 40
 
     def image(*layers: np.ndarray) -> np.ndarray:
         return np.concatenate(np.broadcast_arrays(*layers), axis=-1).astype(np.float16, copy=False)
@@ -55,11 +61,6 @@ def make_frame(height: int = 24, width: int = 40, seed: int = 0) -> Frame:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(1)
-
-
-@pytest.fixture
-def frame() -> Frame:
-    return make_frame()
 
 
 @pytest.fixture

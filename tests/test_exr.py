@@ -17,9 +17,9 @@ def pixels(height: int = 9, width: int = 13, dtype: type = np.float16) -> np.nda
     return RNG.random((height, width)).astype(dtype)
 
 
-def part(name: str, channels: dict[str, np.ndarray]) -> OpenEXR.Part:
+def part(name: str, channels: dict[str, np.ndarray], left: int = 0) -> OpenEXR.Part:
     height, width = next(iter(channels.values())).shape
-    corners = np.array([0, 0], np.int32), np.array([width - 1, height - 1], np.int32)
+    corners = np.array([left, 0], np.int32), np.array([left + width - 1, height - 1], np.int32)
     display = np.array([0, 0], np.int32), np.array([63, 63], np.int32)
     header = {
         "dataWindow": corners,
@@ -154,6 +154,19 @@ def test_sizes_that_disagree(tmp_path: Path) -> None:
         exr.read_channels(path)
     with pytest.raises(ValueError, match="sizes disagree"):
         exr.write_channels(path, {"a.R": pixels(4, 5), "b.R": pixels(5, 5)})
+
+
+def test_parts_that_lie_apart(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    parts = [part("a", {"R": pixels()}), part("b", {"R": pixels()}, left=3)]
+    OpenEXR.File(parts).write(str(path))
+    with pytest.raises(ValueError, match="its parts do not start at the same pixel"):
+        exr.read_channels(path)
+
+
+def test_types_that_exr_lacks(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match=r"float16, float32, uint32; b\.R is float64"):
+        exr.write_channels(tmp_path / "a.exr", {"a.R": pixels(), "b.R": pixels(dtype=np.float64)})
 
 
 def test_unwritable(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def _denoise(
         warnings.simplefilter("always", UserWarning)
         # The first frame of a kind is denoised twice, to tell compiling from denoising.
         for _ in range(1 if shapes in compiled else 2):
-            indirect = np.asarray(denoise(frame, **settings))
+            indirect = np.asarray(denoise(frame, **settings), np.float32)
             times.append(time.perf_counter())
     compiled.add(shapes)
     about = _about(frame, settings, arguments.spp)
@@ -166,7 +166,7 @@ def _write(
     from jflnr.frame import composite, read_header
     from jflnr.metrics import exposure
 
-    picture = np.asarray(composite(frame, indirect))
+    picture = np.asarray(composite(frame, indirect), np.float32)
     if png:
         # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
         lit = composite(dataclasses.replace(frame, emission=None), indirect)

@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     guides = choose(frames[0], arguments.guides)
     block = BLOCK if arguments.block is None else arguments.block
     make_folder(arguments.output)
-    print(f"fitting on {len(frames)} frames with the guides {', '.join(guides) or '(none)'}")
+    print(f"frames: {len(frames)}, guides: {', '.join(guides) or 'none'}", flush=True)
     result = fit(frames, guides=guides, block=block, steps=arguments.steps, progress=_progress)
     save_parameters(
         arguments.output,
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     model = result.parameters
     print(
-        f"SMAPE {result.before:.5f} before, {result.after:.5f} after {result.steps} steps\n"
+        f"SMAPE {result.before:.5f} before, {result.after:.5f} after, steps: {result.steps}\n"
         f"sigma {float(model.sigma):.4g}, eps {float(model.eps):.4g}, "
         f"eps_prime {float(model.eps_prime):.4g} -> {arguments.output}"
     )

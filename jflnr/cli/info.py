@@ -9,8 +9,6 @@ import numpy as np
 from jflnr import exr, layouts
 from jflnr.cli.common import table, to_json
 
-TYPES = {"float16": "half", "float32": "float", "uint32": "uint"}
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="an EXR file")
@@ -71,7 +69,7 @@ def _layer(name: str, parts: list[str], channels: dict[str, np.ndarray]) -> dict
     return {
         "layer": name,
         "channels": " ".join(parts),
-        "type": "/".join(sorted({TYPES[channels[n].dtype.name] for n in names})),
+        "type": "/".join(sorted({exr.TYPES[channels[n].dtype.name] for n in names})),
         "min": float(values.min()) if values.size else None,
         "max": float(values.max()) if values.size else None,
         "not_finite_pixels": int((~finite.all(axis=-1)).sum()),

@@ -38,7 +38,7 @@ def test_result_is_printed_and_read_by_denoise(
     argv = ["fit", str(frame_file), str(frame_file), "-o", str(out), "--steps", "3"]
     assert main([*argv, "--guides", "normal", "--block", "4"]) == 0
     text = capsys.readouterr().out
-    assert "step 1: SMAPE 0.25" in text and "SMAPE 0.50000 before, 0.25000 after 1 steps" in text
+    assert "step 1: SMAPE 0.25" in text and "SMAPE 0.50000 before, 0.25000 after, steps: 1" in text
     assert stand_in == [{"frames": 2, "guides": ("normal",), "block": 4, "steps": 3}]
     parameters, about = load_parameters(out)
     assert float(parameters.sigma) == pytest.approx(20)
