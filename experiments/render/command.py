@@ -1,65 +1,94 @@
-"""`python -m experiments render SCENE ...`: renders frames of our scenes, or of any Mitsuba XML."""
+"""`python -m experiments render`: frames of our scenes or of any Mitsuba 3 XML, and data sets.
+
+    render SCENE -o FILE.exr     one view of `room`, `FAMILY-SEED`, a shared scene, or an XML file
+    render SCENE -o FOLDER --views N        its camera where it has one, else N random views
+    render SCENE -o FOLDER --motion camera|light|object --frames N      a sequence
+    render families [-o docs/scenes.png]    one scene of each family on a contact sheet
+    render data [--folder cache/frames] [--frames 400]      training frames; resumes
+    render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
+    render efficiency [SCENE...]            samples a second, variance x seconds of each sampling
+"""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 from pathlib import Path
 
 from experiments.render import backend
-from experiments.render.progress import Progress
+
+VERBS = ("families", "data", "statistics", "efficiency")
 
 
 def main(argv: list[str]) -> int:
-    """Render as the arguments say; the exit status."""
-    arguments = _parser().parse_args(argv)
+    """Do as the arguments say; the exit status: 0, or 2 with one sentence on what is wrong."""
+    verb = argv[0] if argv and argv[0] in VERBS else "one"
+    arguments = _parser(verb).parse_args(argv if verb == "one" else argv[1:])
     try:
-        variant = backend.start(arguments.threads)
-        return _render(arguments, variant)
+        backend.start(arguments.threads)
+        # Modules that use Mitsuba's types can only be loaded once its variant is set.
+        importlib.import_module(f"experiments.render.commands.{verb}").run(arguments)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("stopped; the same command goes on from here", file=sys.stderr)
+        return 130
+    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="experiments render", description=__doc__)
-    parser.add_argument("scene", help="a scene of ours (room, ...), or a Mitsuba scene.xml")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="EXR file to write")
-    parser.add_argument("--width", type=int, default=480)
-    parser.add_argument("--height", type=int, default=270)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--error", type=float, default=0.03, help="of the reference")
-    parser.add_argument("--minutes", type=float, default=20, help="at most, for the reference")
-    parser.add_argument("--leave-out", nargs="*", default=[], help="layers not to write")
+def _parser(verb: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments render",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--threads", type=int, help="CPU threads; all by default")
-    parser.add_argument("--overwrite", action="store_true")
+    {"one": _one, "families": _families, "data": _data, "statistics": _statistics,
+     "efficiency": _efficiency}[verb](parser)
     return parser
 
 
-def _render(arguments: argparse.Namespace, variant: str) -> int:
-    from experiments.render import frame
-    from experiments.render.camera import Camera
-    from experiments.render.reference import Goal
-    from experiments.render.scene import build
-    from experiments.scenes.room import room
+def _one(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", help="room, FAMILY-SEED (stairs-3), a shared scene, or an XML")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="EXR file, or a folder")
+    parser.add_argument("--width", type=int, default=640)
+    parser.add_argument("--height", type=int, default=360)
+    parser.add_argument("--seed", type=int, default=0, help="of the noise and of random views")
+    parser.add_argument("--view", type=int, help="0: the scene's own; from 100 on: random")
+    parser.add_argument("--views", type=int, help="so many random views, into a folder")
+    parser.add_argument("--spp", type=int, nargs="+", default=[1], help="sample counts, 1..64")
+    parser.add_argument("--realisations", type=int, default=1, help="of 1 spp")
+    parser.add_argument("--bounces", type=int, default=1, help="of indirect light")
+    parser.add_argument("--nee-only", action="store_true", help="without MIS: 4 rays a sample")
+    parser.add_argument("--ao-distance", type=float, help="in scene units")
+    parser.add_argument("--direct-spp", type=int, default=256)
+    parser.add_argument("--reference-spp", type=int, help="exactly so many, whatever the error")
+    parser.add_argument("--error", type=float, default=0.02, help="goal of the reference")
+    parser.add_argument("--minutes", type=float, default=20, help="at most, for a reference")
+    parser.add_argument("--leave-out", nargs="*", default=[], metavar="LAYER")
+    parser.add_argument("--motion", choices=("camera", "light", "object"), help="a sequence")
+    parser.add_argument("--frames", type=int, default=20, help="of a sequence")
 
-    world = room()
-    view = world.view
-    assert view is not None
-    settings = frame.Settings(
-        arguments.width,
-        arguments.height,
-        arguments.seed,
-        direct_spp=256,
-        goal=Goal(arguments.error, seconds=60 * arguments.minutes),
-    )
-    camera = Camera.looking(view.origin, view.target, view.fov_x)
-    state = Path("cache/state") / f"{arguments.output.stem}.npz"
-    with Progress(arguments.output.name) as progress:
-        layers, facts = frame.render(
-            build(world), camera, settings, world.ao_distance, state, progress
-        )
-    facts = {"scene": arguments.scene, "view": 0, "split": "train", "variant": variant} | facts
-    frame.write(arguments.output, layers, facts, tuple(arguments.leave_out))
-    print(facts)
-    return 0
+
+def _families(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/scenes.png"))
+    parser.add_argument("--seed", type=int, default=1, help="of the scenes")
+    parser.add_argument("--spp", type=int, default=256)
+
+
+def _data(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
+    parser.add_argument("--frames", type=int, default=400)
+    parser.add_argument("--split", choices=("train", "val", "test"), default="train")
+
+
+def _statistics(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/scene_statistics.png"))
+
+
+def _efficiency(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenes", nargs="*", default=["room", "furnished-1", "lamps-1"])
+    parser.add_argument("--spp", type=int, default=64)

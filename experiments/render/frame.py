@@ -22,7 +22,7 @@ from jflnr.exr import write_channels
 
 AXES = {"normal": "XYZ", "position": "XYZ", "depth": "Z", "ao": "Y", "mask": "Y", "motion": "XY"}
 SINGLE = ("depth",)  # in float; every other layer in half
-RENDERER = 2  # counts the changes that alter the frames
+RENDERER = 3  # counts the changes that alter the frames
 
 Layers = dict[str, NDArray[np.floating[Any]]]
 
@@ -83,6 +83,7 @@ def render(
         "reference_spp": reference.spp,
         "reference_seconds": round(reference.seconds, 1),
         "reference_median_relative_standard_error": round(reference.relative_error(), 5),
+        "reference_sampling": "guided next-event estimation" + (" + MIS" if reference.mis else ""),
         "reference_samples_per_second": round(reference.samples_per_second()),
     }
     return layers, header(camera, settings, ao_distance) | facts

@@ -2,7 +2,8 @@
 
 Four replicates are summed, each a scrambled (0,2)-sequence of its own. The first two make
 `reference_a`. The spread of the four gives the standard error, which randomised sequences allow
-and which a variance over their (dependent) samples would overstate.
+and which a variance over their (dependent) samples would overstate. Before the first sample, a pilot
+teaches a guide (`guide.py`) and decides whether multiple importance sampling pays in this view.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from experiments.render.guide import Guide
 from experiments.render.sampling import stream_seed
 from experiments.render.tracer import Tracer
 
@@ -50,6 +52,8 @@ class Accumulator:
     sums: NDArray[np.float64]
     spp: int = 0
     seconds: float = 0.0
+    guide: Guide | None = None
+    mis: bool = True
 
     @classmethod
     def of(
@@ -79,6 +83,8 @@ class Accumulator:
     def run(self, goal: Goal, report: Callable[[float, str], None] | None = None) -> None:
         """Sample until the goal is met; saves its state on the way."""
         saved = time.monotonic()
+        if not self.enough(goal):
+            self.prepare()
         while not self.enough(goal):
             self._step(goal)
             if report:
@@ -88,6 +94,32 @@ class Accumulator:
                 saved = time.monotonic()
         if self.state is not None:
             self.state.unlink(missing_ok=True)
+
+    def prepare(self) -> None:
+        """Teach the guide, then keep or drop multiple importance sampling, whichever is better."""
+        self.guide, self.mis = self.tracer.guide(), self.settings.mis
+        for i, spp in enumerate((16, 32)):
+            seed = stream_seed(self.seed, "pilot", i)
+            self._indirect(spp, seed, 0, learning=True)
+            self.guide.learn()
+        if self.settings.mis:
+            self.mis = self._cost(True) < self._cost(False)
+
+    def _cost(self, mis: bool) -> float:
+        """Variance x seconds of a few samples, relative to the mean."""
+        self.mis = mis
+        self._indirect(1, 0, 0)  # compiles
+        start = time.process_time()
+        a, b = (self._indirect(16, stream_seed(self.seed, "cost", i), 0) for i in range(2))
+        seconds = time.process_time() - start
+        spread = np.abs(a - b).mean(-1)[self.mask] / np.maximum((a + b).mean(-1)[self.mask], 1e-9)
+        return float(np.median(spread) ** 2 * seconds) if self.mask.any() else 0.0
+
+    def _indirect(
+        self, spp: int, seed: int, first: int, learning: bool = False
+    ) -> NDArray[np.float64]:
+        bounces = self.settings.bounces
+        return self.tracer.indirect(spp, seed, first, bounces, self.mis, self.guide, learning)
 
     def enough(self, goal: Goal) -> bool:
         """Whether the error is small, or a bound on samples or time is reached."""
@@ -110,8 +142,7 @@ class Accumulator:
         start = time.monotonic()
         for i in range(REPLICATES):
             seed = stream_seed(self.seed, i)
-            s = self.settings
-            self.sums[i] += self.tracer.indirect(more, seed, each, s.bounces, s.mis)
+            self.sums[i] += self._indirect(more, seed, each)
         self.seconds += time.monotonic() - start
         self.spp += REPLICATES * more
 

@@ -30,7 +30,7 @@ def build(world: World) -> Any:
     if world.environment is not None:
         bitmap = mi.Bitmap(np.ascontiguousarray(world.environment, np.float32))
         content["sky"] = {"type": "envmap", "bitmap": bitmap}
-    return mi.load_dict(content)
+    return mi.load_dict(content, parallel=False)
 
 
 def lambertian(reflectance: dict[str, Any]) -> dict[str, Any]:
@@ -95,3 +95,4 @@ def _mesh(name: str, group: list[Surface]) -> Any:
     values["faces"] = faces.astype(np.uint32).ravel()
     values.update()
     return mesh
+

@@ -1,0 +1,15 @@
+"""`render data`: fills a folder with the frames of a split; stops and resumes at any time."""
+
+from __future__ import annotations
+
+import argparse
+
+from experiments.render.dataset import evaluation_jobs, fill, training_jobs
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Render until the folder holds `--frames` frames of the split."""
+    split = arguments.split
+    jobs = training_jobs() if split == "train" else evaluation_jobs(split)
+    there = fill(arguments.folder, jobs, arguments.frames, lambda line: print(line, flush=True))
+    print(f"{there} frames in {arguments.folder}")

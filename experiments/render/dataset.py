@@ -1,0 +1,142 @@
+"""Fills a folder with training frames: resumable, split by scene, a manifest beside the frames."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.render import frame
+from experiments.render.manifest import Manifest
+from experiments.render.reference import Goal
+from experiments.render.sampling import stream_seed
+from experiments.render.source import RANDOM, Source, load
+from experiments.render.splits import TEST, TRAIN_ROOMS, VAL, check_split
+from experiments.scenes.catalogue import FAMILIES
+
+NOISY = {"train": (1, 2, 4, 8, 16), "val": (1, 2, 4, 8, 16, 32, 64), "test": (1, 2, 4, 8, 16, 32, 64)}
+REALISATIONS = 4
+ERROR = {"train": 0.06, "val": 0.02, "test": 0.02}
+SECONDS_PER_PIXEL = 75 / (320 * 184)  # at most, for a reference
+VIEWS = 2
+
+
+@dataclass(frozen=True)
+class Job:
+    """One frame to render; `split` is the folder that it goes to."""
+
+    scene: str
+    view: int
+    width: int
+    height: int
+    split: str = "train"
+
+    @property
+    def name(self) -> str:
+        """The file's name in the folder, which tells jobs apart."""
+        size = "" if (self.width, self.height) == (320, 184) else f"_{self.width}x{self.height}"
+        return f"{self.split}/{self.scene}_{self.view}{size}.exr"
+
+
+def training_jobs() -> Iterator[Job]:
+    """Without end: in each round one scene of every family and one training room, few views each.
+
+    Most frames are 320 x 184; every sixth round has one of 640 x 360 in each scene, every
+    twelfth one of 1280 x 720 in some.
+    """
+    for number, _ in enumerate(iter(int, 1)):
+        room = TRAIN_ROOMS[number % len(TRAIN_ROOMS)]
+        names = [f"{family}-{number + 1}" for family in FAMILIES] + [room]
+        for index, name in enumerate(names):
+            first = RANDOM + VIEWS * (number // len(TRAIN_ROOMS)) if name == room else RANDOM
+            for view in range(first, first + VIEWS):
+                width, height = _size(number, index, view - first)
+                yield Job(name, view, width, height)
+        if number == 2:
+            for scene in TRAIN_ROOMS:
+                for view in (0, 1, 3, 4):
+                    yield Job(scene, view, 320, 180)
+
+
+def evaluation_jobs(split: str) -> Iterator[Job]:
+    """One 1920 x 1080 frame of every scene of the splits val or test."""
+    for scene in VAL if split == "val" else TEST:
+        yield Job(scene, 0, 1920, 1080, split)
+
+
+def _size(number: int, index: int, view: int) -> tuple[int, int]:
+    if view == 0 and number % 12 == 11 and index % 4 == number // 12 % 4:
+        return 1280, 720
+    return (640, 360) if view == 0 and number % 6 == 5 else (320, 184)
+
+
+def settings_of(job: Job) -> frame.Settings:
+    """Four 1-spp realisations and more; the reference to a goal or a bound on its time."""
+    seconds = SECONDS_PER_PIXEL * job.width * job.height if job.split == "train" else 1200
+    return frame.Settings(
+        job.width,
+        job.height,
+        stream_seed(job.scene, job.view, job.width),
+        noisy=NOISY[job.split],
+        realisations=REALISATIONS,
+        direct_spp=64 if job.split == "train" else 256,
+        goal=Goal(ERROR[job.split], seconds=seconds),
+    )
+
+
+def fill(
+    folder: Path,
+    jobs: Iterator[Job],
+    frames: int,
+    say: Callable[[str], None] = print,
+) -> int:
+    """Render jobs until `frames` frames are there; returns how many are. Finished ones stay.
+
+    Raises ValueError where a job's scene does not belong to the split it is to be written to.
+    """
+    manifest = Manifest(folder)
+    source: Source | None = None
+    start, made = time.monotonic(), 0
+    there = manifest.count()
+    for job in jobs:
+        if there >= frames:
+            break
+        check_split(job.scene, job.split)
+        if manifest.done(job.name):
+            continue
+        if source is None or source.name != job.scene:
+            source = load(job.scene)
+        if not _render(folder, manifest, job, source):
+            say(f"{job.name}: no valid view")
+            continue
+        there, made = there + 1, made + 1
+        left = (frames - there) * (time.monotonic() - start) / made / 60
+        error = manifest.entries[job.name]["reference_median_relative_standard_error"]
+        say(f"{job.name}: error {error:.3f}; {there} of {frames} frames, {left:.0f} minutes left")
+    return there
+
+
+def _render(folder: Path, manifest: Manifest, job: Job, source: Source) -> bool:
+    """Render one job; False where the scene has no such view."""
+    if job.view < RANDOM and job.view not in source.own:
+        manifest.skip(job.name, "the scene has no view of this number")
+        return False
+    found = source.view(job.view)
+    if found is None:
+        manifest.skip(job.name, "no valid view was found")
+        return False
+    camera, near = found
+    state = folder / "state" / (job.name.replace("/", "_") + ".npz")
+    layers, facts = frame.render(source.scene, camera, settings_of(job), near, state)
+    facts = {"scene": job.scene, "view": job.view, "split": job.split} | facts
+    frame.write(folder / job.name, layers, facts)
+    manifest.add(job.name, _without_matrix(facts))
+    return True
+
+
+def _without_matrix(facts: dict[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in facts.items() if k != "camera_to_world"}
+
+
