@@ -48,7 +48,7 @@ def fit(
     guides: Sequence[str] | None = None,
     block: int = BLOCK,
     initial: Parameters = DEFAULT,
-    steps: int = 40,
+    steps: int = 80,
     progress: Callable[[int, float], None] | None = None,
 ) -> Fit:
     """Minimise the mean SMAPE of the reflected light against the references with L-BFGS.
