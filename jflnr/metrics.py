@@ -42,7 +42,8 @@ def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
     checks.image("indirect", indirect, 3)
     checks.same_size(indirect=indirect, reference=frame.reference)
     albedo, reference = _float64(frame.albedo), _float64(frame.reference)
-    x, y = albedo * _float64(indirect), albedo * reference
+    with np.errstate(invalid="ignore"):  # black times infinite
+        x, y = albedo * _float64(indirect), albedo * reference
     result = compare(x, y)
     result["mse_unbiased"] = None
     if frame.reference_a is not None:
@@ -52,10 +53,15 @@ def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
 
 
 def compare(picture: Array, reference: Array) -> dict[str, float | None]:
-    """All metrics of a linear picture (H, W, 3) that need nothing but its reference."""
+    """All metrics of a linear picture (H, W, 3) that need nothing but its reference.
+
+    All are NaN if a pixel of either is NaN or infinite.
+    """
     x, y = _float64(picture), _float64(reference)
     checks.image("picture", x, 3)
     checks.same_size(picture=x, reference=y)
+    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        return dict.fromkeys(("psnr", "ssim", "flip", "rmse", "smape", "mse"), np.nan)
     scale = exposure(y)
     shown, wanted = display(x, scale), display(y, scale)
     return {

@@ -85,6 +85,16 @@ def test_ssim_is_left_out_for_tiny_images(frame: Frame) -> None:
     assert metrics.measure(tiny, tiny.indirect)["ssim"] is None
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_pixel_that_is_not_finite_makes_all_nan(frame: Frame, value: float) -> None:
+    indirect = frame.indirect.copy()
+    indirect[3, 4] = value
+    black = dataclasses.replace(frame, albedo=frame.albedo * (indirect == indirect.clip(0, 1e9)))
+    for each in (frame, black):
+        measured = metrics.measure(each, indirect)
+        assert all(np.isnan(measured[n]) for n in ("psnr", "ssim", "flip", "rmse", "smape", "mse"))
+
+
 def test_errors(frame: Frame) -> None:
     with pytest.raises(ValueError, match="no layer reference"):
         metrics.measure(dataclasses.replace(frame, reference=None), frame.indirect)
