@@ -2,7 +2,6 @@
 
 from jflnr.denoising import BACKENDS, METHODS, denoise
 from jflnr.flr.parameters import Parameters, load_parameters, save_parameters
-from jflnr.flr.regression import flr
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 
 __version__ = "0.1.0"
@@ -14,7 +13,6 @@ __all__ = [
     "Parameters",
     "composite",
     "denoise",
-    "flr",
     "load_parameters",
     "read_frame",
     "read_header",
