@@ -200,7 +200,7 @@ def _not_finite(frame: "Frame") -> list[str]:
     if not (counts := not_finite(frame)):
         return []
     listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
-    return [f"some pixels are NaN or infinite, and count for nothing in the fit: {listed}"]
+    return [f"pixels that are NaN or infinite (the fit leaves them out): {listed}"]
 
 
 def _remarks(record: dict[str, Any]) -> list[str]:
