@@ -92,8 +92,9 @@ class Guide:
         """For a view whose primary hits `position` `(H, W, 3)` lie where `mask` `(H, W)` is true."""
         rows, columns = -(-height // TILE), -(-width // TILE)
         lane = dr.arange(mi.UInt32, width * height)
-        y = lane // width
-        tile = (y // TILE) * columns + (lane - y * width) // TILE
+        w, across = dr.opaque(mi.UInt32, width), dr.opaque(mi.UInt32, columns)
+        y = lane // w
+        tile = (y // TILE) * across + (lane - y * w) // TILE
         dr.eval(tile)
         seen = position[mask] if mask.any() else np.zeros((1, 3))
         low, high = np.quantile(seen, 0.01, axis=0), np.quantile(seen, 0.99, axis=0)

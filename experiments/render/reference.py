@@ -110,7 +110,7 @@ class Accumulator:
         self.mis = mis
         self._indirect(1, 0, 0)  # compiles
         start = time.process_time()
-        a, b = (self._indirect(16, stream_seed(self.seed, "cost", i), 0) for i in range(2))
+        a, b = (self._indirect(8, stream_seed(self.seed, "cost", i), 0) for i in range(2))
         seconds = time.process_time() - start
         spread = np.abs(a - b).mean(-1)[self.mask] / np.maximum((a + b).mean(-1)[self.mask], 1e-9)
         return float(np.median(spread) ** 2 * seconds) if self.mask.any() else 0.0

@@ -46,7 +46,8 @@ class Tracer:
         surface = hit & ~(dr.max(emission) > 0)
         albedo = dr.select(surface, transport.albedo_of(si, surface), 0)
         start = transport.vertex_of(si, ray.d)
-        depth = dr.dot(si.p - ray.o, mi.Vector3f(*map(float, camera.to_world[:3, 2])))
+        forward = mi.Vector3f(*(dr.opaque(mi.Float, float(v)) for v in camera.to_world[:3, 2]))
+        depth = dr.dot(si.p - ray.o, forward)
         dr.eval(start.it, start.normal, surface, hit, albedo, emission, depth)
         layers = {
             "albedo": albedo,
