@@ -1,8 +1,12 @@
 """Denoising of one-sample path-traced light by Fast Local (Neural) Regression."""
 
-from jflnr.denoising import BACKENDS, METHODS, denoise
-from jflnr.flr.parameters import Parameters, load_parameters, save_parameters
-from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jflnr.denoising import BACKENDS, METHODS, denoise
+    from jflnr.flr.parameters import Parameters, load_parameters, save_parameters
+    from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 
 __version__ = "0.1.0"
 
@@ -19,3 +23,14 @@ __all__ = [
     "save_parameters",
     "write_frame",
 ]
+
+_HOMES = ("jflnr.denoising", "jflnr.flr.parameters", "jflnr.frame")
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for: JAX takes a second, which `jflnr --help` need not wait for."""
+    if name in __all__:
+        for home in map(importlib.import_module, _HOMES):
+            if hasattr(home, name):
+                return getattr(home, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

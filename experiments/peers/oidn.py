@@ -47,7 +47,9 @@ def filter_for(
         network.execute()
         if (error := device.get_error()) is not None:
             raise RuntimeError(f"OIDN: {error}")
-        return np.where(albedo > 1e-3, result / np.maximum(albedo, 1e-3), 0) if modulated else result
+        return (
+            np.where(albedo > 1e-3, result / np.maximum(albedo, 1e-3), 0) if modulated else result
+        )
 
     # The arrays and the device must outlive the call.
     call.owners = (device, network, images)  # type: ignore[attr-defined]

@@ -47,34 +47,38 @@ def _apply_strip(
     shift: jax.Array,
     block: int,
 ) -> jax.Array:
-    """One row of blocks: guides `(rows, W, Q)` and three rows of models `(Q + 1, C, w)`."""
+    """One row of blocks: guides `(rows, W, Q)` and three rows of models `(Q + 1, C, w)`.
+
+    Horizontally the row is cut into cells from one block centre to the next, where the model is
+    `start + t difference`; the guides are multiplied in before t is, which halves the work.
+    """
     rows, width = jax.tree.leaves(guides)[0].shape[:2]
-    x = [plane.astype(here.dtype) - s for plane, s in zip(planes(guides), shift, strict=True)]
-    before, centre, after = (jnp.asarray(f, here.dtype) for f in _hat(block))
-    vertical = (
-        before[:rows, None] * above[:, :, None]
-        + centre[:rows, None] * here[:, :, None]
-        + after[:rows, None] * below[:, :, None]
-    )
-    # Barriers: at low resolution these are cheap to store and dear to compute once per pixel.
-    vertical = lax.optimization_barrier(vertical)
-    left, right = lax.optimization_barrier(_neighbours(vertical, axis=3))
+    before, centre, after = (jnp.asarray(f, here.dtype)[:rows, None] for f in _hat(block))
+    models = before * above[:, :, None] + centre * here[:, :, None] + after * below[:, :, None]
+    edges = jnp.concatenate([models[..., :1], models, models[..., -1:]], axis=-1)
 
-    def at_pixels(i: int, c: int) -> jax.Array:
-        value = (
-            left[i, c, ..., None] * before
-            + vertical[i, c, ..., None] * centre
-            + right[i, c, ..., None] * after
-        )
-        return value.reshape(rows, -1)[:, :width]
+    margin = block - block // 2
+    cells = edges.shape[-1] - 1
+    t = jnp.asarray((np.arange(block) - margin + 0.5) / block + 0.5, here.dtype)
 
+    def into_cells(plane: jax.Array, shift: jax.Array) -> jax.Array:
+        guide = plane.astype(here.dtype) - shift
+        guide = jnp.where(jnp.isfinite(guide), guide, 0)
+        padded = jnp.pad(guide, ((0, 0), (margin, cells * block - margin - width)))
+        return padded.reshape(rows, cells, block)
+
+    x = [into_cells(plane, s) for plane, s in zip(planes(guides), shift, strict=True)]
+    # Cheap to keep in the cache, dear to compute once per pixel and channel.
+    start, difference, x = lax.optimization_barrier((edges[..., :-1], jnp.diff(edges), x))
     channels = []
     for c in range(here.shape[1]):
-        total = at_pixels(0, c)
+        at_start, change = start[0, c, ..., None], difference[0, c, ..., None]
         for q, guide in enumerate(x):
-            total += jnp.where(jnp.isfinite(guide), guide, 0) * at_pixels(q + 1, c)
-        channels.append(total)
-    return jnp.stack(channels, axis=-1)
+            at_start += guide * start[q + 1, c, ..., None]
+            change += guide * difference[q + 1, c, ..., None]
+        value = (at_start + t * change).reshape(rows, -1)
+        channels.append(value[:, margin : margin + width])
+    return jnp.stack(lax.optimization_barrier(channels), axis=-1)
 
 
 def _hat(block: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -88,8 +88,9 @@ def collect(
     def strip(arrays: tuple[jax.Array, Guides, jax.Array | None]) -> jax.Array:
         return _strip_moments(*arrays, shift=shift, block=block)
 
-    # A strip of one block row stays in the cache while its products are formed.
-    moments = lax.map(strip, jax.tree.map(lambda a: into_strips(a, block), inputs))
+    # Three rows of blocks stay in the cache while their products are formed, and keep cores busy.
+    strips = jax.tree.map(lambda a: into_strips(a, block), inputs)
+    moments = lax.map(strip, strips, batch_size=3)
     if target.shape[0] % block:
         rest = strip(jax.tree.map(lambda a: a[rows * block :], inputs))
         moments = jnp.concatenate([moments, rest[None]])
@@ -122,6 +123,8 @@ def _strip_moments(
     x = [jnp.where(good, plane, 0) for plane in x]
     y = [jnp.where(good, plane, 0) for plane in y]
     one = good.astype(dtype)
+    # Kept in the cache, instead of computed anew for each product.
+    one, x, y = lax.optimization_barrier((one, x, y))
     weighted = [one, *x]
     if weight is not None and weight.dtype != bool:
         one = jnp.where(good, weight, 0).astype(dtype)

@@ -51,7 +51,7 @@ class Parameters(NamedTuple):
 
 
 # Fitted on the training frames at 1 spp: `jflnr fit`, see docs/method.md.
-DEFAULT = Parameters.of(sigma=16.0, eps=1e-3, eps_prime=1e-4)
+DEFAULT = Parameters.of(sigma=15.0, eps=1.3e-5, eps_prime=6.5e-3)
 
 
 def save_parameters(path: str | Path, parameters: Parameters, **about: Any) -> None:
