@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -20,7 +21,7 @@ from jflnr.frame import Array, Frame
 # Pixels on a side that share one model: the size the paper found to lose nothing.
 BLOCK = 8
 METHODS = ("flr",)
-BACKENDS = ("jax",)
+BACKENDS = ("jax", "opencl")
 
 
 def denoise(
@@ -58,7 +59,13 @@ def denoise(
     if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
         raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
     parameters = DEFAULT if parameters is None else parameters
-    return _denoise(frame_inputs(frame, names), parameters, names, block, _support(parameters))
+    inputs, support = frame_inputs(frame, names), _support(parameters)
+    if backend == "opencl":
+        from jflnr import opencl
+
+        images, coarse_block = _images(inputs, names), _coarse_block(inputs, block)
+        return opencl.flr(parameters=parameters, block=coarse_block, support=support, **images)
+    return _denoise(inputs, parameters, names, block, support)
 
 
 def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
@@ -75,25 +82,33 @@ def _support(parameters: Parameters) -> int:
     return 24 * max(int(np.ceil(float(parameters.sigma) * 3 / 24)), 1)
 
 
+def _coarse_block(frame: Frame, block: int) -> int:
+    """The block in pixels of `frame.indirect`, which may be coarser than the guides."""
+    factor = -(-frame.normal.shape[0] // frame.indirect.shape[0])
+    return max(block // factor, 1)
+
+
+@functools.partial(jax.jit, static_argnames="names")
+def _images(frame: Frame, names: tuple[str, ...]) -> dict[str, Any]:
+    """The images that `flr` takes, from the layers of the frame."""
+    target = jnp.asarray(frame.indirect)
+    layers = guide_layers.layers(frame, names)
+    mask = None if frame.mask is None else jnp.asarray(frame.mask)
+    factor = -(-frame.normal.shape[0] // target.shape[0])
+    if factor == 1:
+        weight = None if mask is None else mask[..., 0] > 0
+        return {"target": target, "guides": layers, "weight": weight}
+    return {
+        "target": target,
+        "guides": tuple(guide_layers.shrink(layer, factor, mask) for layer in layers),
+        "guides_map": layers,
+        "weight": None if mask is None else guide_layers.shrink(mask, factor)[..., 0],
+    }
+
+
 @functools.partial(jax.jit, static_argnames=("names", "block", "support"))
 def _denoise(
     frame: Frame, parameters: Parameters, names: tuple[str, ...], block: int, support: int
 ) -> jax.Array:
-    layers = guide_layers.layers(frame, names)
-    mask = None if frame.mask is None else jnp.asarray(frame.mask)
-    target = jnp.asarray(frame.indirect)
-    factor = -(-frame.normal.shape[0] // target.shape[0])
-    if factor == 1:
-        weight = None if mask is None else mask[..., 0] > 0
-        return flr(target, layers, parameters, block=block, support=support, weight=weight)
-    coarse = tuple(guide_layers.shrink(layer, factor, mask) for layer in layers)
-    weight = None if mask is None else guide_layers.shrink(mask, factor)[..., 0]
-    return flr(
-        target,
-        coarse,
-        parameters,
-        block=max(block // factor, 1),
-        support=support,
-        guides_map=layers,
-        weight=weight,
-    )
+    block = _coarse_block(frame, block)
+    return flr(parameters=parameters, block=block, support=support, **_images(frame, names))
