@@ -44,3 +44,17 @@ class Camera:
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = local[..., 0] / local[..., 2] / sx, local[..., 1] / local[..., 2] / sy
         return np.stack([(1 - x) * width / 2, (1 - y) * height / 2], -1)
+
+    def points(
+        self,
+        pixels: NDArray[np.float64],
+        depth: NDArray[np.float64],
+        width: int,
+        height: int,
+    ) -> NDArray[np.float64]:
+        """World points `(..., 3)` at a depth along the view axis, seen at pixels `(..., 2)`."""
+        sx, sy = self.slopes(width, height)
+        x = (1 - 2 * pixels[..., 0] / width) * sx
+        y = (1 - 2 * pixels[..., 1] / height) * sy
+        local = np.stack([x, y, np.ones_like(x)], -1) * depth[..., None]
+        return local @ self.to_world[:3, :3].T + self.to_world[:3, 3]

@@ -57,13 +57,14 @@ def render(
     ao_distance: float,
     state: Path | None = None,
     report: Callable[[float, str], None] | None = None,
+    tracer: Tracer | None = None,
 ) -> tuple[Layers, dict[str, Any]]:
     """The layers of one view, each `(H, W, C)`, and the facts of its header.
 
     The reference resumes from the file `state`, where that is given and exists. `report` hears
-    the share done and the standard error.
+    the share done and the standard error. `tracer` may hold the primary hits already.
     """
-    tracer = Tracer.of(scene, camera, settings.width, settings.height)
+    tracer = tracer or Tracer.of(scene, camera, settings.width, settings.height)
 
     def seed(layer: str) -> int:
         return stream_seed(settings.seed, layer)

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.render.camera import Camera
 
@@ -23,14 +24,21 @@ GLASS = ("dielectric", "roughdielectric", "thindielectric", "null")
 GREY = "0.5 0.5 0.5"
 
 
-def load_xml(path: Path) -> tuple[Any, Camera]:
+Ball = tuple[NDArray[np.float64], float, str]
+
+
+def load_xml(path: Path, ball: Ball | None = None) -> tuple[Any, Camera]:
     """The Lambertian scene of a Mitsuba 3 file, and its first camera.
+
+    `ball`, a matrix (4, 4), a radius and a name, adds a chequered ball to the scene.
 
     Raises ValueError where the file is no scene that Mitsuba can load, or has no camera.
     """
     try:
         root = ElementTree.parse(path).getroot()
         make_lambertian(root)
+        if ball:
+            root.append(_ball(*ball))
         mi.file_resolver().prepend(str(path.resolve().parent))
         scene = _load(ElementTree.tostring(root, "unicode"))
     except (ElementTree.ParseError, RuntimeError) as error:
@@ -40,6 +48,23 @@ def load_xml(path: Path) -> tuple[Any, Camera]:
     if not scene.sensors():
         raise ValueError(f"{path} has no camera (a <sensor>): add one")
     return scene, _camera(scene.sensors()[0], path)
+
+
+def _ball(matrix: NDArray[np.float64], radius: float, name: str) -> Element:
+    shape = ElementTree.Element("shape", type="sphere", id=name)
+    transform = ElementTree.SubElement(shape, "transform", name="to_world")
+    ElementTree.SubElement(transform, "scale", value=str(radius))
+    values = " ".join(f"{v:.9g}" for v in matrix.ravel())
+    ElementTree.SubElement(transform, "matrix", value=values)
+    material = ElementTree.SubElement(shape, "bsdf", type="diffuse")
+    texture = ElementTree.SubElement(
+        material, "texture", type="checkerboard", name="reflectance"
+    )
+    ElementTree.SubElement(texture, "rgb", name="color0", value="0.7 0.2 0.05")
+    ElementTree.SubElement(texture, "rgb", name="color1", value="0.6 0.6 0.55")
+    uv = ElementTree.SubElement(texture, "transform", name="to_uv")
+    ElementTree.SubElement(uv, "scale", x="4", y="2")
+    return shape
 
 
 def _load(text: str) -> Any:

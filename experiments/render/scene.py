@@ -18,7 +18,8 @@ def build(world: World) -> Any:
     for surface in world.surfaces:
         groups.setdefault(_group(surface), []).append(surface)
     for number, group in enumerate(groups.values()):
-        content[f"mesh{number:04}"] = _mesh(group[0].name or f"mesh{number:04}", group)
+        name = group[0].name or f"mesh{number:04}"
+        content[name] = _mesh(name, group)
     for number, ball in enumerate(world.balls):
         content[f"ball{number:02}"] = {
             "type": "sphere",

@@ -45,6 +45,7 @@ class Source:
     ao_distance: float
     world: World | None
     own: dict[int, Camera]
+    path: Path | None = None
 
     def view(self, number: int) -> tuple[Camera, float] | None:
         """Camera and ambient occlusion distance of a view; None where no valid view was found.
@@ -85,7 +86,7 @@ def _load_xml(path: Path, name: str) -> Source:
     short = path.parent.name if path.name == "scene.xml" else path.stem
     own, distance = _stored_views(short)
     own.setdefault(0, home)
-    return Source(short, scene, distance or _near(scene, home), None, own)
+    return Source(short, scene, distance or _near(scene, home), None, own, path)
 
 
 def _stored_views(name: str) -> tuple[dict[int, Camera], float | None]:

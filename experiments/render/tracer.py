@@ -32,6 +32,7 @@ class Tracer:
     height: int
     start: transport.Vertex
     active: Any
+    shape: Any
     guides: dict[str, Image]
 
     @classmethod
@@ -48,7 +49,7 @@ class Tracer:
         start = transport.vertex_of(si, ray.d)
         forward = mi.Vector3f(*(dr.opaque(mi.Float, float(v)) for v in camera.to_world[:3, 2]))
         depth = dr.dot(si.p - ray.o, forward)
-        dr.eval(start.it, start.normal, surface, hit, albedo, emission, depth)
+        dr.eval(start.it, start.normal, surface, hit, albedo, emission, depth, si.shape)
         layers = {
             "albedo": albedo,
             "normal": dr.select(hit, start.normal, 0),
@@ -60,7 +61,15 @@ class Tracer:
         shape = (height, width, -1)
         guides = {k: np.array(v, np.float32).T.reshape(shape) for k, v in layers.items()}
         lights = transport.Lights.of(scene)
-        return cls(scene, lights, width, height, start, mi.Bool(hit), guides)
+        return cls(scene, lights, width, height, start, mi.Bool(hit), si.shape, guides)
+
+    def shows(self, name: str) -> NDArray[np.bool_]:
+        """Where `(H, W)` the shape of a name is seen."""
+        seen = np.zeros((self.height, self.width), bool)
+        for shape in self.scene.shapes():
+            if shape.id() == name:
+                seen |= np.array(self.shape == mi.ShapePtr(shape)).reshape(seen.shape)
+        return seen
 
     def _sums(
         self, estimate: Callable[[Any, Any], Any], spp: int, seed: int, first: int | None

@@ -1,0 +1,128 @@
+"""`render SCENE`: one view into a file, several views or a sequence into a folder."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from experiments.render import frame
+from experiments.render.manifest import Manifest
+from experiments.render.progress import Progress
+from experiments.render.reference import Goal
+from experiments.render.sampling import stream_seed
+from experiments.render.sequence import Step, motion_vectors, steps
+from experiments.render.source import RANDOM, Source, load
+from experiments.render.splits import split_of
+from experiments.render.tracer import Tracer
+
+STATES = Path("cache/state")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Render what is not there yet; finished frames are kept."""
+    source = load(arguments.scene)
+    settings = settings_of(arguments)
+    if arguments.views:
+        numbers = range(RANDOM, RANDOM + arguments.views)
+        for number in numbers:
+            number += 1000 * arguments.seed
+            path = arguments.output / f"{source.name}_{number}.exr"
+            _view(source, number, path, settings, arguments)
+    elif arguments.motion:
+        _sequence(source, settings, arguments)
+    else:
+        number = arguments.view
+        if number is None:
+            number = 0 if 0 in source.own else RANDOM
+        _view(source, number, arguments.output, settings, arguments)
+
+
+def settings_of(arguments: argparse.Namespace) -> frame.Settings:
+    """What the arguments ask for. Raises ValueError for what cannot be."""
+    for name in ("width", "height", "realisations", "bounces", "frames", "direct_spp"):
+        if getattr(arguments, name) < 1:
+            raise ValueError(f"--{name.replace('_', '-')} must be at least 1")
+    if not 0 < arguments.error or not 0 < arguments.minutes:
+        raise ValueError("--error and --minutes must be positive")
+    if any(n < 1 for n in arguments.spp):
+        raise ValueError("--spp takes sample counts of at least 1")
+    goal = Goal(arguments.error, seconds=60 * arguments.minutes)
+    if arguments.reference_spp:
+        count = arguments.reference_spp
+        goal = Goal(0.0, count, count, float("inf"))
+    return frame.Settings(
+        arguments.width,
+        arguments.height,
+        arguments.seed,
+        tuple(arguments.spp),
+        arguments.realisations,
+        arguments.bounces,
+        not arguments.nee_only,
+        arguments.direct_spp,
+        goal=goal,
+    )
+
+
+def _view(
+    source: Source, number: int, path: Path, settings: frame.Settings, arguments: Any
+) -> None:
+    if path.exists():
+        print(f"{path} is there already: kept")
+        return
+    found = source.view(number)
+    if found is None:
+        raise ValueError(f"no valid view {number} of {source.name} was found: try another --seed")
+    facts = {"view": number}
+    _write(source, Step(source.scene, found[0]), None, facts, path, settings, arguments)
+
+
+def _sequence(source: Source, settings: frame.Settings, arguments: Any) -> None:
+    number = arguments.view if arguments.view is not None else (0 if source.own else RANDOM)
+    found = source.view(number)
+    if found is None:
+        raise ValueError(f"no valid view {number} of {source.name} was found")
+    before: Step | None = None
+    for i, step in enumerate(steps(source, found[0], arguments.motion, arguments.frames)):
+        path = arguments.output / f"{source.name}_{arguments.motion}_{i:03}.exr"
+        facts = {"view": number, "motion": arguments.motion, "frame": i}
+        if path.exists():
+            print(f"{path} is there already: kept")
+        else:
+            own = replace(settings, seed=stream_seed(settings.seed, "frame", i))
+            _write(source, step, before, facts, path, own, arguments)
+        before = step
+
+
+def _write(
+    source: Source,
+    step: Step,
+    before: Step | None,
+    facts: dict[str, Any],
+    path: Path,
+    settings: frame.Settings,
+    arguments: Any,
+) -> None:
+    near = arguments.ao_distance or source.ao_distance
+    tracer = Tracer.of(step.scene, step.camera, settings.width, settings.height)
+    state = STATES / f"{path.stem}_{settings.width}x{settings.height}.npz"
+    with Progress(path.name) as progress:
+        layers, more = frame.render(
+            step.scene, step.camera, settings, near, state, progress, tracer
+        )
+    if "motion" in facts:
+        layers["motion"] = motion_vectors(tracer, step, before)
+    facts = {"scene": source.name, "split": split_of(source.name)} | facts | more
+    frame.write(path, layers, facts, tuple(arguments.leave_out))
+    Manifest(path.parent).add(path.name, {k: v for k, v in facts.items() if k != "camera_to_world"})
+    _say(path, facts)
+
+
+def _say(path: Path, facts: dict[str, Any]) -> None:
+    error = facts["reference_median_relative_standard_error"]
+    speed = facts["reference_samples_per_second"] / 1e6
+    spp = facts["reference_spp"]
+    print(f"{path}: reference {spp} spp, error {error:.3f}, {speed:.2f} million samples/s")
+
+
