@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import jflnr
-
-SHIPPED = Path(jflnr.__file__).parent / "data" / "room.exr"
+from jflnr.denoising import SHIPPED_FRAME as SHIPPED
 
 
 def folder() -> Path:

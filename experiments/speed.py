@@ -110,7 +110,7 @@ def growth(megapixels: float = 2.0736, guides: int = 5, channels: int = 3) -> di
     """Time of compiled FLR on one size."""
     y, x = synthetic(megapixels, guides, channels)
     compiled = jax.jit(flr)
-    call = lambda: compiled(y, x, DEFAULT).block_until_ready()  # noqa: E731
+    call = lambda: compiled(y, x, DEFAULT).block_until_ready()
     seconds = interleaved({"flr": call}, 7)["flr"]
     return {
         "megapixels": y.shape[0] * y.shape[1] / 1e6,

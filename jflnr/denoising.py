@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -21,6 +22,7 @@ from jflnr.frame import Array, Frame
 # Pixels on a side that share one model: the size the paper found to lose nothing.
 BLOCK = 8
 METHODS = ("flr",)
+SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 BACKENDS = ("jax", "opencl")
 
 
@@ -49,7 +51,10 @@ def denoise(
     """
     checks.choice("method", method, METHODS)
     checks.choice("backend", backend, BACKENDS)
+    checks.positive_integer("block", block)
     names = guide_layers.choose(frame, guides)
+    inputs = frame_inputs(frame, names)
+    _check_sizes(inputs)
     if guides is None and frame.ao is None:
         warnings.warn(
             "The frame has no ao layer, so the guides are normal and depth only; "
@@ -59,7 +64,7 @@ def denoise(
     if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
         raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
     parameters = DEFAULT if parameters is None else parameters
-    inputs, support = frame_inputs(frame, names), _support(parameters)
+    support = _support(parameters)
     if backend == "opencl":
         from jflnr import opencl
 
@@ -73,6 +78,19 @@ def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
     needed = {"indirect", "normal", "depth", "mask", *names}
     unused = {field.name: None for field in dataclasses.fields(Frame) if field.name not in needed}
     return dataclasses.replace(frame, **unused)  # type: ignore[arg-type]
+
+
+def _check_sizes(frame: Frame) -> None:
+    layers = {name: layer for name, layer in vars(frame).items() if name != "indirect"}
+    checks.same_size(**layers)
+    checks.image("indirect", frame.indirect)
+    (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]
+    factor = -(-height // h)
+    if (-(-height // factor), -(-width // factor)) != (h, w):
+        raise ValueError(
+            f"frame.indirect is {w} x {h} pixels and the guides are {width} x {height}; "
+            "they must be the same, or the guides a whole number of times larger"
+        )
 
 
 def _support(parameters: Parameters) -> int:

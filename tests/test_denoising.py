@@ -1,0 +1,120 @@
+"""`denoise` on frames: the contract others call."""
+
+import dataclasses
+import json
+
+import jax
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr import denoising
+from jflnr.metrics import measure
+
+
+def changed(frame, **layers):
+    return dataclasses.replace(frame, **layers)
+
+
+def psnr(frame, indirect):
+    return measure(frame, np.asarray(indirect))["psnr"]
+
+
+@pytest.mark.parametrize("name", ["val/dining-room_0", "test/sponza_1"])
+def test_agrees_with_an_independent_implementation_on_real_frames(data, name):
+    """baselines.json holds the PSNR of a numpy float64 FLR with these parameters."""
+    published = json.loads((data / "baselines.json").read_bytes())["frames"][f"{name}.exr"]
+    frame = jflnr.read_frame(data / f"{name}.exr")
+    for sigma in (10, 24):
+        ours = jflnr.denoise(frame, parameters=jflnr.Parameters.of(sigma, 1e-3, 1e-4))
+        truth = published["1 spp"][f"flr sigma {sigma}"]["psnr"]
+        assert psnr(frame, ours) == pytest.approx(truth, abs=0.02)
+
+
+def test_the_shipped_frame_gains_ten_decibels():
+    frame = jflnr.read_frame(denoising.SHIPPED_FRAME)
+    assert psnr(frame, jflnr.denoise(frame)) > psnr(frame, frame.indirect) + 10
+
+
+def test_result_is_float32_of_the_frames_size(frame):
+    out = jflnr.denoise(frame)
+    assert out.shape == frame.indirect.shape and out.dtype == np.float32
+
+
+def test_light_groups_add_up_and_come_out_in_order(frame):
+    half = frame.indirect * np.float32(0.25)
+    groups = np.concatenate([frame.indirect - half, half], axis=-1)
+    out = np.asarray(jflnr.denoise(changed(frame, indirect=groups)))
+    whole = np.asarray(jflnr.denoise(frame))
+    np.testing.assert_allclose(out[..., :3] + out[..., 3:], whole, atol=1e-4)
+    np.testing.assert_allclose(out[..., 3:], 0.25 * whole, atol=1e-4)
+
+
+def test_twice_the_light_is_twice_the_result(frame):
+    twice = jflnr.denoise(changed(frame, indirect=2 * frame.indirect))
+    np.testing.assert_allclose(twice, 2 * np.asarray(jflnr.denoise(frame)), rtol=1e-5)
+
+
+def test_the_unit_of_length_does_not_matter(frame):
+    metres = jflnr.denoise(frame, guides=("normal", "depth", "position"))
+    scaled = changed(frame, depth=100 * frame.depth, position=100 * frame.position)
+    centimetres = jflnr.denoise(scaled, guides=("normal", "depth", "position"))
+    np.testing.assert_allclose(metres, centimetres, rtol=1e-3, atol=1e-4)
+
+
+def test_what_is_outside_the_mask_has_no_influence(frame):
+    mask = frame.mask.copy()
+    mask[:, :10] = 0
+    noise = frame.indirect.copy()
+    noise[:, :10] = 1e4
+    clean = jflnr.denoise(changed(frame, mask=mask))
+    spoiled = jflnr.denoise(changed(frame, mask=mask, indirect=noise))
+    np.testing.assert_array_equal(clean, spoiled)
+
+
+@pytest.mark.parametrize("factor", [2, 4])
+def test_smaller_light_is_upsampled_to_the_guides(frame, factor):
+    light = np.full((24 // factor, 40 // factor, 3), 1.5, np.float32)
+    out = jflnr.denoise(changed(frame, indirect=light))
+    assert out.shape == (24, 40, 3)
+    np.testing.assert_allclose(out, 1.5, rtol=1e-5)
+
+
+def test_without_ao_the_user_is_told(frame):
+    with pytest.warns(UserWarning, match="no ao layer"):
+        out = jflnr.denoise(changed(frame, ao=None))
+    np.testing.assert_array_equal(out, jflnr.denoise(frame, guides=("normal", "depth")))
+
+
+def test_the_second_frame_does_not_recompile(frame):
+    jflnr.denoise(frame)
+    before = denoising._denoise._cache_size()
+    jflnr.denoise(changed(frame, indirect=3 * frame.indirect, reference=None))
+    assert denoising._denoise._cache_size() == before
+
+
+def test_gradients_reach_the_parameters(frame):
+    def loss(parameters):
+        return (jflnr.denoise(frame, parameters=parameters) ** 2).sum()
+
+    grads = jax.grad(loss)(jax.tree.map(np.float32, jflnr.Parameters.of(8, 1e-3, 1e-3)))
+    assert all(np.isfinite(g) and g != 0 for g in grads)
+
+
+@pytest.mark.parametrize(
+    ("layers", "options", "words"),
+    [
+        ({}, {"method": "magic"}, "method must be one of .*magic"),
+        ({}, {"backend": "abacus"}, "backend must be one of .*abacus"),
+        ({}, {"guides": ("normal", "hue")}, "'hue' is none of"),
+        ({}, {"guides": ("normal", "normal")}, "twice"),
+        ({"position": None}, {"guides": ("position",)}, "no position layer; it has normal"),
+        ({}, {"block": 0}, "block"),
+        ({"indirect": np.full((24, 40, 3), np.nan, np.float32)}, {}, "no finite value"),
+        ({"indirect": np.zeros((23, 40, 3), np.float32)}, {}, "indirect"),
+        ({"ao": np.zeros((24, 41, 1), np.float32)}, {}, "ao"),
+    ],
+)
+def test_wrong_input_is_named(frame, layers, options, words):
+    with pytest.raises(ValueError, match=words):
+        jflnr.denoise(changed(frame, **layers), **options)
