@@ -88,9 +88,10 @@ def collect(
     def strip(arrays: tuple[jax.Array, Guides, jax.Array | None]) -> jax.Array:
         return _strip_moments(*arrays, shift=shift, block=block)
 
-    # Three rows of blocks stay in the cache while their products are formed, and keep cores busy.
+    # Three rows of blocks stay in the cache while their products are formed, and keep cores busy;
+    # where they do not divide the frame, one: a second program for the rest would compile longer.
     strips = jax.tree.map(lambda a: into_strips(a, block), inputs)
-    moments = lax.map(strip, strips, batch_size=3)
+    moments = lax.map(strip, strips, batch_size=1 if rows % 3 else 3)
     if target.shape[0] % block:
         rest = strip(jax.tree.map(lambda a: a[rows * block :], inputs))
         moments = jnp.concatenate([moments, rest[None]])
