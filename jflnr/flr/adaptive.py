@@ -1,0 +1,151 @@
+"""FLR that adapts to the noise and to edges: weights, windows and widths from the data.
+
+Pass 1 over the pixels collects moments of the brightness; a first fit, the pilot, comes from them.
+Pass 2 weighs every pixel by the variance that the pilot predicts and collects the moments of all
+channels at fine blocks. Everything else happens on blocks: a pyramid of grids, on each the same
+edge-aware window, and from each finer grid as much of the difference to the coarser one as is
+signal. Pass 3 evaluates the models. docs/adaptive.md derives the steps.
+"""
+
+from __future__ import annotations
+
+
+import jax
+import jax.numpy as jnp
+
+from jflnr import checks
+from jflnr.flr.apply import apply
+from jflnr.flr.arguments import check_regression
+from jflnr.flr.energy import rescale, restore
+from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, predict
+from jflnr.flr.merge import interpolate, signal_share
+from jflnr.flr.moments import Guides, centre, collect, index_xy
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
+from jflnr.flr.pyramid import double, halve
+
+BLOCK = 4
+LEVELS = 4
+
+
+def flr_adaptive(
+    target: jax.Array,
+    guides: Guides,
+    parameters: AdaptiveParameters,
+    *,
+    block: int = BLOCK,
+    levels: int = LEVELS,
+    weight: jax.Array | None = None,
+    keep_energy: bool = False,
+) -> jax.Array:
+    """Fit the guides to a noisy image, adapting to its noise and its edges.
+
+    Scales with `target`. Not linear in it, but the channels are treated alike: images of three
+    channels denoised together as light groups (C = 3, 6, ...) sum to the denoised sum.
+
+    target: `(H, W, C)`, the noisy radiance Y, not negative. guides: `(H, W, Q)`, X without the
+    constant, or several such arrays. parameters: the fitted constants. block: side of the finest
+    blocks, in pixels. levels: number of grids, each twice as coarse. weight: `(H, W)`, numbers or a
+    boolean mask; 0 removes a pixel, as does any value that is not finite. keep_energy: give every
+    frame exactly the mean brightness of its input, instead of nearly.
+    Returns `(H, W, C)`.
+
+    Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
+    """
+    check_regression(target, guides, None, weight, block, 1)
+    checks.positive_integer("levels", levels)
+    numbers = parameters.numbers()
+    shift = centre(guides)
+    light = jnp.einsum("hwc,c->hw", target, brightness(target.shape[-1], target.dtype))
+
+    moments = collect(light[..., None], guides, shift, 2 * block, weight)
+    mean = _frame_mean(moments, shift.size)
+    weights, noise = _weights(light, guides, shift, moments, mean, weight, numbers, block)
+    grid = Grid(collect(target, guides, shift, block, weights), noise, block)
+    coefficients = _fit_pyramid(grid, shift, target.shape[-1], levels, mean, numbers)
+    coefficients = restore(coefficients, moments, shift.size, numbers.slack)
+    image = apply(coefficients, guides, shift, block)
+    return rescale(image, light, weight) if keep_energy else image
+
+
+def _frame_mean(moments: jax.Array, guides: int) -> jax.Array:
+    """Mean brightness of the usable pixels; 1 if there is no light, where any scale will do."""
+    mean = jnp.sum(moments[index_xy(0, 0, guides, 1)]) / jnp.maximum(jnp.sum(moments[0]), 1e-12)
+    return jnp.where(mean > 0, mean, 1)
+
+
+def _weights(
+    light: jax.Array,
+    guides: Guides,
+    shift: jax.Array,
+    moments: jax.Array,
+    mean: jax.Array,
+    weight: jax.Array | None,
+    numbers: AdaptiveParameters,
+    block: int,
+) -> tuple[jax.Array, jax.Array]:
+    """Each pixel's weight from a first fit of the brightness, and the noise it leaves.
+
+    The variance of a pixel grows with its brightness, and the best weight is one over it.
+    light: `(H, W)`. moments: of `light`, on blocks twice as large as `block`.
+    Returns the weights `(H, W)` and their squared weighted residuals, `(1, h, w)` block means.
+    """
+    grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
+    features = _guide_features(grid, shift.size, numbers)
+    pilot = fit_level(grid, features, shift, 1, mean, numbers)
+    expected = apply(pilot.coefficients, guides, shift, 4 * block)[..., 0]
+    # The floor is there for the derivative of the power at 0.
+    relative = jnp.maximum(expected / mean, 1e-6)
+    weights = 1 / (relative**numbers.exponent + numbers.offset)
+    if weight is not None:
+        weights = jnp.where(weight > 0, weights * weight, 0)
+    residual = jnp.where(jnp.isfinite(light), light - expected, 0)
+    squares = jnp.where(jnp.isfinite(weights), weights, 0) * residual
+    return weights, collect((squares**2)[..., None], (), jnp.zeros(0), block)[1:]
+
+
+def _fit_pyramid(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    levels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+) -> jax.Array:
+    """Models of the finest grid, put together from all levels. Returns `(Q + 1, C, h, w)`."""
+    grids = [grid]
+    for _ in range(levels - 1):
+        last = grids[-1]
+        grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+    features = _guide_features(grids[-1], shift.size, numbers)
+    coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
+    merged = coarse.coefficients
+    for grid in reversed(grids[:-1]):
+        coarse, merged = _refine(grid, coarse, merged, shift, channels, mean, numbers)
+    return merged
+
+
+def _refine(
+    grid: Grid,
+    coarse: Fit,
+    merged: jax.Array,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+) -> tuple[Fit, jax.Array]:
+    """One level finer: its own fit, and what is merged so far with its share added."""
+    size = grid.moments.shape[1:]
+    window = coarse.window
+    coarse, merged = interpolate(coarse, *size), double(merged, *size)
+    level = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
+    # Windows end where what is known so far of the brightness changes.
+    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
+    features = jnp.concatenate([_guide_features(grid, shift.size, numbers), edge[None]])
+    fine = fit_level(grid, features, shift, channels, mean, numbers)
+    reference = level**2 + 0.01 * mean**2
+    share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
+    return fine, merged + share * (fine.coefficients - coarse.coefficients)
+
+
+def _guide_features(grid: Grid, guides: int, numbers: AdaptiveParameters) -> jax.Array:
+    return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]

@@ -1,0 +1,102 @@
+"""One level of the pyramid: local models at one window width, and how noisy they are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
+from jflnr.flr.moments import index_xx, index_xy
+from jflnr.flr.parameters import Parameters
+from jflnr.flr.solve import solve
+from jflnr.flr.window import Window, gather, gather_moments, window_over
+
+
+class Grid(NamedTuple):
+    """What is collected at one size of block.
+
+    moments: `(K, h, w)`, weighted. noise: `(1, h, w)`, mean of the squared weighted residuals of
+    the brightness. block: the block's side in pixels.
+    """
+
+    moments: jax.Array
+    noise: jax.Array
+    block: int
+
+
+class Fit(NamedTuple):
+    """The models of one level.
+
+    coefficients: `(Q + 1, C, h, w)`. variance: `(h, w)`, of the brightness they predict.
+    window: the window they were fitted under.
+    """
+
+    coefficients: jax.Array
+    variance: jax.Array
+    window: Window
+
+
+def brightness(channels: int, dtype: jnp.dtype) -> jax.Array:
+    """Weights `(C,)` of the channels in the brightness by which all of them are treated.
+
+    Luminance of linear sRGB for colours, or for several light groups of three channels, whose sum
+    counts; else the sum.
+    """
+    luminance = (0.2126, 0.7152, 0.0722)
+    weights = luminance * (channels // 3) if channels % 3 == 0 else (1,) * channels
+    return jnp.asarray(weights, dtype)
+
+
+def mean_guides(moments: jax.Array, guides: int) -> jax.Array:
+    """Each block's mean of [1, X - shift], `(Q + 1, h, w)`; [1, 0, ...] where it is empty."""
+    n = moments[:1]
+    planes = moments[np.array([index_xx(i, 0) for i in range(guides + 1)])]
+    mean = planes * jnp.where(n > 1e-12, 1 / jnp.where(n > 1e-12, n, 1), 0)
+    return mean.at[0].set(1)
+
+
+def predict(coefficients: jax.Array, regressors: jax.Array) -> jax.Array:
+    """Brightness of the models at one point per block.
+
+    coefficients: `(Q + 1, C, h, w)`. regressors: `(Q + 1, h, w)`. Returns `(h, w)`.
+    """
+    weights = brightness(coefficients.shape[1], coefficients.dtype)
+    return jnp.einsum("qchw,qhw,c->hw", coefficients, regressors, weights)
+
+
+def fit_level(
+    grid: Grid,
+    features: jax.Array,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+) -> Fit:
+    """Fit the models of one level.
+
+    The variance of a weighted mean, sum(w^2 r^2) / sum(w)^2 with residuals r, tells how noisy the
+    window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
+
+    features: `(F, h, w)`, what must be alike in a window. mean: brightness of the whole frame.
+    """
+    guides = shift.size
+    window = window_over(features, numbers.sigma)
+    moments = gather_moments(grid.moments, window, numbers.sigma, guides, channels)
+    n = jnp.maximum(moments[0], 1e-12)
+    variance = gather(grid.noise, window.squared())[0] / (n * grid.block) ** 2
+    start = index_xy(0, 0, guides + 2, channels)
+    colour = moments[start : start + channels] / n
+    level = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
+    relative = variance / (jnp.maximum(level, 0) ** 2 + 0.01 * mean**2)
+    ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
+
+    # Positions are centred on the window already, so only their own ridge is added.
+    for i in (guides + 1, guides + 2):
+        moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
+    local = Parameters(0.0, jnp.log(numbers.eps + ridge), jnp.log(numbers.eps_prime + ridge))
+    centred = jnp.concatenate([shift, jnp.zeros(2, shift.dtype)])
+    coefficients = solve(moments, centred, local, channels)
+    return Fit(coefficients[: guides + 1], variance, window)
