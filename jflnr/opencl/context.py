@@ -44,6 +44,7 @@ class Context:
         self.work_group = work_group or (32 if self.on_cpu else 64)
         self.launches: list[Launch] | None = None
         self._kernels: dict[tuple[Any, ...], Any] = {}
+        self._in_use: list[np.ndarray] = []
 
     def width(self, block: int | None = None) -> int:
         """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given."""
@@ -77,7 +78,7 @@ class Context:
         return self.cl.array.empty(self.queue, tuple(shape), dtype, allocator=self.pool)
 
     def array(self, values: Any, writable: bool = False) -> Any:
-        """A device array of a numpy array; on a processor the same memory, which must stay alive.
+        """A device array of a numpy array, in C order; on a processor it is the same memory.
 
         Device arrays are passed through.
         """
@@ -85,6 +86,7 @@ class Context:
             return values
         if not self.on_cpu:
             return self.cl.array.to_device(self.queue, values, allocator=self.pool)
+        self._in_use.append(values)  # until the kernels that use it are through
         flags = self.cl.mem_flags
         access = flags.READ_WRITE if writable else flags.READ_ONLY
         buffer = self.cl.Buffer(self.context, access | flags.USE_HOST_PTR, hostbuf=values)
@@ -93,7 +95,8 @@ class Context:
     def finish(self, output: Any, result: Any) -> Any:
         """Make the device array `output` readable as `result`, a numpy array or `output` itself."""
         if self.on_cpu:
-            self.queue.finish()  # also since the inputs may go away with the caller's arrays
+            self.queue.finish()
+            self._in_use.clear()
         if output is not result and not self.on_cpu:
             output.get(ary=result)
         elif output is not result:

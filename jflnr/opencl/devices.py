@@ -28,7 +28,7 @@ def pyopencl() -> ModuleType:
     return pyopencl
 
 
-def devices() -> list[Any]:
+def all_devices() -> list[Any]:
     """All devices, best kind first, as `pyopencl.Device`; `NoDevice` if there is none."""
     cl = pyopencl()
     try:
@@ -47,16 +47,17 @@ def kind(device: Any) -> str:
 
 
 def choose(name: str | int | None = None) -> Any:
-    """A device by its number in `devices()` or a part of its or its platform's name; else the best.
+    """A device by its number in `all_devices()` or a part of its name; by default the best.
 
     Raises `ValueError` if there is none of that name, `NoDevice` if there is none at all.
     """
-    found = devices()
+    found = all_devices()
     if name is None:
         return found[0]
     for number, device in enumerate(found):
         label = f"{device.platform.name} {device.name}"
-        if str(name) == str(number) or (not str(name).isdigit() and str(name).lower() in label.lower()):
+        wanted = str(name).lower()
+        if wanted == str(number) or (not wanted.isdigit() and wanted in label.lower()):
             return device
     listed = ", ".join(f"{i}: {device.name.strip()}" for i, device in enumerate(found))
     raise ValueError(f"There is no OpenCL device {name!r}; there are {listed}")

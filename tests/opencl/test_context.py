@@ -1,0 +1,93 @@
+"""What surrounds the kernels: devices, reuse, determinism, results left on the device, errors."""
+
+import numpy as np
+import pytest
+
+from jflnr.opencl import Context, NoDevice, all_devices, flr
+from jflnr.opencl import context as context_module
+from tests.opencl.conftest import PARAMETERS, scene
+
+
+def test_three_runs_give_equal_bits(context: Context) -> None:
+    target, guides = scene(61, 203, 5, 3)
+    runs = [flr(target, guides, PARAMETERS, context=context) for _ in range(3)]
+    assert runs[0].tobytes() == runs[1].tobytes() == runs[2].tobytes()
+
+
+@pytest.mark.parametrize("work_group", [1, 7])
+def test_work_group_size_does_not_matter(context: Context, work_group: int) -> None:
+    target, guides = scene(61, 203, 5, 3)
+    other = Context(context.device, work_group=work_group)
+    found = flr(target, guides, PARAMETERS, context=other)
+    assert found.tobytes() == flr(target, guides, PARAMETERS, context=context).tobytes()
+
+
+def test_result_on_the_device(context: Context) -> None:
+    target, guides = scene(61, 203, 5, 3)
+    right = flr(target, guides, PARAMETERS, context=context)
+    there = [context.array(a) for a in (target, guides)]
+    found = flr(*there, PARAMETERS, context=context, on_device=True)
+    np.testing.assert_array_equal(found.get(), right)
+    assert flr(*there, PARAMETERS, context=context, out=found) is found
+    np.testing.assert_array_equal(found.get(), right)
+
+
+def test_odd_arrays_are_read_right(context: Context) -> None:
+    target, guides = scene(61, 203, 5, 3)
+    right = flr(target, guides, PARAMETERS, context=context)
+    wide = np.zeros((61, 203, 8))
+    wide[..., 5:], wide[..., :5] = target, guides
+    found = flr(wide[..., 5:], wide[..., :5], PARAMETERS, context=context)
+    np.testing.assert_array_equal(found, right)
+    shifted = np.zeros(target.nbytes + 2, np.uint8)[2:].view(np.float32).reshape(target.shape)
+    shifted[...] = target
+    target.flags.writeable = False
+    found = flr(shifted, guides, PARAMETERS, context=context)
+    np.testing.assert_array_equal(found, flr(target, guides, PARAMETERS, context=context))
+
+
+def test_wrong_arguments(context: Context) -> None:
+    target, guides = scene(20, 30, 5, 3)
+    with pytest.raises(ValueError, match="block"):
+        flr(target, guides, PARAMETERS, context=context, block=0)
+    with pytest.raises(ValueError, match="guides has 17 channels"):
+        flr(target, np.zeros((20, 30, 17), np.float32), PARAMETERS, context=context)
+    with pytest.raises(ValueError, match="target has 10 channels"):
+        flr(np.zeros((20, 30, 10), np.float32), guides, PARAMETERS, context=context)
+    with pytest.raises(ValueError, match="out must"):
+        flr(target, guides, PARAMETERS, context=context, out=np.zeros((20, 30, 3)))
+    with pytest.raises(TypeError, match="floating"):
+        flr(target.astype(int), guides, PARAMETERS, context=context)
+
+
+def test_kernels_refuse_what_they_cannot_do(context: Context) -> None:
+    for file, defines in (
+        ("moments.cl", "-DQ=17 -DC=3 -DWIDTH=1 -DBLOCK=8"),
+        ("solve.cl", "-DQ=5 -DC=10 -DWIDTH=1"),
+        ("apply.cl", "-DQ=5 -DC=3 -DWIDTH=3 -DSTEP=8"),
+        ("apply.cl", "-DQ=5 -DC=3 -DWIDTH=1"),
+    ):
+        program = context.cl.Program(context.context, context_module.source(file))
+        with pytest.raises(context.cl.RuntimeError, match="error"):
+            program.build(defines.split())
+
+
+def test_devices_are_chosen_by_number_or_name(context: Context) -> None:
+    first = all_devices()[0]
+    assert Context(0).device == first
+    assert Context(first.name.strip()[:6].upper()).device == first
+    with pytest.raises(ValueError, match="no OpenCL device 'nonesuch'"):
+        Context("nonesuch")
+
+
+def test_no_device_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    cl = pytest.importorskip("pyopencl")
+    monkeypatch.setattr(cl, "get_platforms", lambda: [])
+    with pytest.raises(NoDevice, match=r"jflnr\[opencl\]"):
+        Context()
+
+
+def test_no_pyopencl_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pyopencl", None)
+    with pytest.raises(NoDevice, match=r"jflnr\[opencl\]"):
+        all_devices()

@@ -1,0 +1,17 @@
+"""How far the kernels, in float32, may be from JAX in float64: one number per step.
+
+All are relative to the largest magnitude in the plane or image compared. A float has 6e-8; sums of
+n terms lose about sqrt(n) of that.
+"""
+
+# Sums over 256 pixels at most, products of shifted guides.
+MOMENTS = 2e-6
+# Two sums of 19 terms.
+BLUR = 1e-6
+# Slopes of independent guides: differences of moments, then a matrix of small condition.
+SOLVE = 2e-5
+# Two bilinear interpolations and a sum of Q products.
+APPLY = 2e-6
+# The four together. What is left after subtracting the squares of means loses most, as it does in
+# JAX in float32.
+WHOLE = 1e-4
