@@ -9,7 +9,23 @@ from pathlib import Path
 
 from experiments import results
 
-NAMES = ("picture", "gain", "speed", "ablation")
+NAMES = (
+    "picture",
+    "gain",
+    "speed",
+    "ablation",
+    "tune",
+    "table1",
+    "pareto",
+    "spp",
+    "regularisation",
+    "block",
+    "guide_choice",
+    "upsample",
+    "lightgroups",
+    "figure9",
+    "complexity",
+)
 
 
 def main(argv: list[str]) -> int:
@@ -20,7 +36,7 @@ def main(argv: list[str]) -> int:
     try:
         for name in names:
             if arguments.command == "list":
-                print(f"{name:12}{_module(name).QUESTION}")
+                print(f"{name:16}{_module(name).QUESTION}")
             elif arguments.command == "run":
                 results.run(_module(name), arguments.quick, arguments.out)
                 results.draw(_module(name), arguments.out, arguments.docs)

@@ -51,3 +51,24 @@ def against(axis: Axes, rows: list[dict[str, Any]], key: str, label: str) -> Non
 def write_text(path: Path, text: str) -> None:
     """Text, written whole or not at all."""
     write_atomically(path, text.encode())
+
+
+def contact_sheet(path: Path, rows: list[tuple[dict[str, Any], dict[str, Any]]]) -> None:
+    """Crops side by side, one row each: (`frame`, `corner` and `metrics`, name to picture)."""
+    names = list(rows[0][1])
+    shape = (1.75 * len(names), 2.15 * len(rows))
+    drawing, axes = plt.subplots(
+        len(rows), len(names), figsize=shape, layout="constrained", squeeze=False
+    )
+    for line, (crop, pictures) in zip(axes, rows, strict=True):
+        for axis, (name, picture) in zip(line, pictures.items(), strict=True):
+            axis.imshow(picture, interpolation="nearest")
+            axis.set(xticks=[], yticks=[])
+            found = crop["metrics"].get(name)
+            text = "PSNR / FLIP" if found is None else f"{found['psnr']:.2f} / {found['flip']:.3f}"
+            axis.set_xlabel(text, fontsize=8)
+            axis.set_title(name.replace(", tuned", ""), fontsize=8)
+        line[0].set_ylabel("{frame} {corner}".format(**crop), fontsize=7)
+    with replacing(path) as beside:
+        drawing.savefig(beside, dpi=130, format=path.suffix[1:])
+    plt.close(drawing)

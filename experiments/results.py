@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import jax
 
+from experiments import resume
 from jflnr.files import write_atomically
 
 PACKAGES = ("jax", "jaxopt", "numpy", "pyopencl", "pocl-binary-distribution", "pyoidn", "mitsuba")
@@ -38,6 +39,7 @@ def run(experiment: Experiment, quick: bool, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{experiment.NAME}.json"
     write_atomically(path, (json.dumps(evidence, indent=1) + "\n").encode())
+    resume.forget(experiment.NAME)
     print(f"{experiment.NAME}: wrote {path}")
 
 

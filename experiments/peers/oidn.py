@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pyoidn
@@ -14,6 +15,11 @@ QUALITY = {
     "balanced": pyoidn.OIDN_QUALITY_BALANCED,
     "high": pyoidn.OIDN_QUALITY_HIGH,
 }
+
+# As the paper of FLNR ran it: on the picture, with albedo and normal taken as noisy.
+PAPER: dict[str, Any] = {"quality": "high", "clean": False, "modulated": True}
+TUNED: dict[str, Any] = {"quality": "high", "clean": False, "modulated": False}
+FAST_TUNED: dict[str, Any] = {"quality": "fast", "clean": False, "modulated": False}
 
 
 def filter_for(
@@ -54,3 +60,10 @@ def filter_for(
     # The arrays and the device must outlive the call.
     call.owners = (device, network, images)  # type: ignore[attr-defined]
     return call
+
+
+def denoise(
+    frame: Frame, *, quality: str = "high", clean: bool = False, modulated: bool = False
+) -> np.ndarray:
+    """OIDN once, `(H, W, 3)` demodulated; see `filter_for`."""
+    return filter_for(frame, quality=quality, clean=clean, modulated=modulated)().copy()

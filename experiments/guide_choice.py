@@ -1,0 +1,75 @@
+"""Which guides matter: greedy selection, as in section 5 of BMFR."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import jflnr
+from experiments import data, plots, results, resume
+from experiments.methods import Method
+from experiments.timing import times
+from experiments.tune import mean_psnr
+from jflnr.guides import NAMES
+
+NAME = "guide_choice"
+QUESTION = "Which guides matter for FLR, in which order, and what does each cost?"
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Add the guide that raises the mean PSNR over val most, one after the other; report test."""
+    tag = "-quick" * quick
+    choice, test = (
+        [data.read(path) for path in ([data.SHIPPED] if quick else data.frames(split))]
+        for split in ("val", "test")
+    )
+
+    def score(key: str) -> dict[str, float]:
+        names = [name for name in key.split("+") if name]
+        return {
+            "val": mean_psnr(choice, jflnr.denoise, {"guides": names}),
+            "test": mean_psnr(test, jflnr.denoise, {"guides": names}),
+        }
+
+    chosen: list[str] = []
+    steps = [{"added": "none", "guides": ""} | resume.rows(f"{NAME}-0{tag}", [""], score)[0]]
+    candidates = list(NAMES[:2] if quick else NAMES)
+    tried = []
+    while candidates:
+        keys = ["+".join([*chosen, name]) for name in candidates]
+        scores = resume.rows(f"{NAME}-{len(chosen) + 1}{tag}", keys, score)
+        tried += [{"guides": key} | s for key, s in zip(keys, scores, strict=True)]
+        best = int(np.argmax([s["val"] for s in scores]))
+        steps.append({"added": candidates[best], "guides": keys[best]} | scores[best])
+        chosen.append(candidates.pop(best))
+    methods = [
+        Method(step["guides"], "jflnr", jflnr.denoise, {"guides": tuple(step["guides"].split("+"))})
+        for step in steps[1:]
+    ]
+    clock = times(methods, test[0], quick)
+    for step in steps[1:]:
+        step |= clock[step["guides"]]
+    return {"steps": steps, "tried": tried}
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """guide_choice.png: PSNR and time as guides are added; guide_choice.md: all that was tried."""
+    steps = result["steps"]
+    columns = {"added": "added", "val": "PSNR, val", "test": "PSNR, test", "ms": "ms, 1080p"}
+    tried = results.table(
+        result["tried"], {"guides": "guides", "val": "PSNR, val", "test": "PSNR, test"}
+    )
+    plots.write_text(folder / f"{NAME}.md", results.table(steps, columns) + "\n" + tried)
+    labels = [steps[0]["added"], *(f"+ {step['added']}" for step in steps[1:])]
+    with plots.figure(folder / f"{NAME}.png", columns=2) as (left, right):
+        places = range(len(steps))
+        left.plot(places, [step["val"] for step in steps], "o-", label="val (chosen on)")
+        left.plot(places, [step["test"] for step in steps], "s--", label="test")
+        right.plot(places[1:], [step["ms"] for step in steps[1:]], "o-")
+        for axis in (left, right):
+            axis.set_xticks(places, labels, rotation=30, ha="right")
+        left.set(ylabel="PSNR at 1 spp, dB")
+        left.legend()
+        right.set(ylabel="milliseconds at 1920 x 1080", ylim=(0, None))
