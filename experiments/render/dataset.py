@@ -43,12 +43,15 @@ class Job:
 def training_jobs() -> Iterator[Job]:
     """Without end: in each round one scene of every family and one training room, few views each.
 
+    A second sunlit room, since most real rooms are lit so and little light is found in them.
+
     Most frames are 320 x 184; every sixth round has one of 640 x 360 in each scene, every
     twelfth one of 1280 x 720 in some.
     """
     for number, _ in enumerate(iter(int, 1)):
         room = TRAIN_ROOMS[number % len(TRAIN_ROOMS)]
-        names = [f"{family}-{number + 1}" for family in FAMILIES] + [room]
+        names = [f"{family}-{number + 1}" for family in FAMILIES]
+        names += [f"sunlit-{1000 + number}", room]
         for index, name in enumerate(names):
             first = RANDOM + VIEWS * (number // len(TRAIN_ROOMS)) if name == room else RANDOM
             for view in range(first, first + VIEWS):

@@ -22,7 +22,7 @@ from jflnr.exr import write_channels
 
 AXES = {"normal": "XYZ", "position": "XYZ", "depth": "Z", "ao": "Y", "mask": "Y", "motion": "XY"}
 SINGLE = ("depth",)  # in float; every other layer in half
-RENDERER = 3  # counts the changes that alter the frames
+RENDERER = 4  # counts the changes that alter the frames
 
 Layers = dict[str, NDArray[np.floating[Any]]]
 

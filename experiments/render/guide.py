@@ -21,7 +21,7 @@ from scipy.ndimage import gaussian_filter
 
 SIDE = 16
 BINS = SIDE * SIDE
-UNIFORM = 0.2  # share of the uniform density: no weight exceeds 5
+UNIFORM = 0.1  # share of the uniform density: no weight exceeds 10
 
 
 @dataclass
@@ -74,7 +74,7 @@ class Table:
 
 
 TILE = 8  # pixels
-GRID = 16  # cells along each axis of the box around what is seen
+GRID = 24  # cells along each axis of the box around what is seen
 
 
 @dataclass

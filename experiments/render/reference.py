@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 REPLICATES = 4
 SAVE_EVERY = 60.0  # seconds
+STOP_LEARNING = 2048  # samples a pixel
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class Accumulator:
         self.guide, self.mis = self.tracer.guide(), self.settings.mis
         for i, spp in enumerate((16, 32)):
             seed = stream_seed(self.seed, "pilot", i)
-            self._indirect(spp, seed, 0, learning=True)
+            self._indirect(spp, seed, 0)
             self.guide.learn()
         if self.settings.mis:
             self.mis = self._cost(True) < self._cost(False)
@@ -115,11 +116,10 @@ class Accumulator:
         spread = np.abs(a - b).mean(-1)[self.mask] / np.maximum((a + b).mean(-1)[self.mask], 1e-9)
         return float(np.median(spread) ** 2 * seconds) if self.mask.any() else 0.0
 
-    def _indirect(
-        self, spp: int, seed: int, first: int, learning: bool = False
-    ) -> NDArray[np.float64]:
+    def _indirect(self, spp: int, seed: int, first: int) -> NDArray[np.float64]:
+        """Guided samples, of which the guide takes note: that costs nothing measurable."""
         bounces = self.settings.bounces
-        return self.tracer.indirect(spp, seed, first, bounces, self.mis, self.guide, learning)
+        return self.tracer.indirect(spp, seed, first, bounces, self.mis, self.guide, bool(self.guide))
 
     def enough(self, goal: Goal) -> bool:
         """Whether the error is small, or a bound on samples or time is reached."""
@@ -136,15 +136,18 @@ class Accumulator:
         return min(1.0, max(by_error, self.seconds / goal.seconds, self.spp / goal.most_spp))
 
     def _step(self, goal: Goal) -> None:
-        """A quarter more samples (at least 16, at most 256) to each replicate."""
+        """A quarter more samples (at least 16, at most 256) to each replicate, to the bound."""
         each = self.spp // REPLICATES
-        more = int(np.clip(each // 4, 16, 256)) // 16 * 16
+        left = -(-(goal.most_spp - self.spp) // REPLICATES)
+        more = min(int(np.clip(each // 4, 16, 256)) // 16 * 16, max(left, 1))
         start = time.monotonic()
         for i in range(REPLICATES):
             seed = stream_seed(self.seed, i)
             self.sums[i] += self._indirect(more, seed, each)
-        self.seconds += time.monotonic() - start
         self.spp += REPLICATES * more
+        if self.guide and self.spp <= STOP_LEARNING:
+            self.guide.learn()
+        self.seconds += time.monotonic() - start
 
     def mean(self) -> NDArray[np.float64]:
         """The reference `(H, W, 3)`."""

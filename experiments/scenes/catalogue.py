@@ -10,6 +10,7 @@ from experiments.scenes.world import World
 
 FAMILIES: dict[str, Callable[[int], World]] = {
     "furnished": rooms.furnished,
+    "sunlit": rooms.sunlit,
     "corridor": passages.corridor,
     "colonnade": passages.colonnade,
     "stairs": passages.stairs,

@@ -8,6 +8,7 @@ from experiments.scenes import furniture, palette
 from experiments.scenes.furniture import Items, placed
 from experiments.scenes.geometry import box, cylinder, lathe, quad, rotation, tube
 from experiments.scenes.shell import Opening, Side, daylight, shell, sides, window
+from experiments.scenes.sky import sky
 from experiments.scenes.world import World, plain
 
 Size = tuple[float, float, float]
@@ -30,6 +31,26 @@ def furnished(seed: int) -> World:
                 _hang_curtains(rng, world, side, hole, size[1])
     if rng.random() < 0.25:
         _ceiling_panel(rng, world, size, strength * rng.uniform(0.5, 3))
+    _furnish(rng, world, size, set(openings))
+    _look_around(rng, world, size)
+    return world
+
+
+def sunlit(seed: int) -> World:
+    """A furnished room whose windows are open to a sky with a small sun: few samples find light."""
+    rng = np.random.default_rng([12, seed])
+    size = _size(rng, 3.2, 7.5)
+    world = World(ao_distance=rng.uniform(0.6, 1.5))
+    world.environment = sky(rng, rows=256, sun=(0.5, 1.5))
+    openings = _windows(rng, size)
+    _enclose(rng, world, size, openings)
+    for name, holes in openings.items():
+        side = sides(size[0], size[2])[name]
+        for hole in holes:
+            side.put(world, window(rng, hole, 0.25))
+            if rng.random() < 0.4:
+                _hang_curtains(rng, world, side, hole, size[1])
+    world.add(box([-30, -0.5, -30], [30, -0.25, 30]), palette.floor(rng))
     _furnish(rng, world, size, set(openings))
     _look_around(rng, world, size)
     return world

@@ -6,26 +6,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def sky(rng: np.random.Generator, strength: float | None = None) -> NDArray[np.float32]:
-    """A map `(64, 128, 3)` whose first row is straight up; with a sun in most cases."""
-    theta = (np.arange(64) + 0.5) / 64 * np.pi
-    phi = (np.arange(128) + 0.5) / 128 * 2 * np.pi
-    up = np.cos(theta)[:, None, None] * np.ones((1, 128, 1))
+def sky(
+    rng: np.random.Generator, rows: int = 64, sun: tuple[float, float] = (2.5, 6.0)
+) -> NDArray[np.float32]:
+    """A map `(rows, 2 * rows, 3)` whose first row is straight up; with a sun in most cases.
+
+    `sun` bounds the deviation of its glow in degrees; its power does not depend on that.
+    """
+    theta = (np.arange(rows) + 0.5) / rows * np.pi
+    phi = (np.arange(2 * rows) + 0.5) / rows * np.pi
+    up = np.cos(theta)[:, None, None] * np.ones((1, 2 * rows, 1))
     zenith = np.array([0.25, 0.45, 0.9]) * rng.uniform(0.5, 1.5)
     horizon = np.array([0.9, 0.85, 0.8]) * rng.uniform(0.6, 1.5, 3)
     ground = np.array([0.25, 0.22, 0.18]) * rng.uniform(0.4, 1.2)
     picture = np.where(up > 0, zenith + (horizon - zenith) * (1 - np.clip(up, 0, 1)) ** 3, ground)
     if rng.random() < 0.7:
         height, around = np.radians(rng.uniform(15, 65)), rng.uniform(0, 2 * np.pi)
-        sun = np.array([np.cos(height) * np.cos(around), np.sin(height),
-                        np.cos(height) * np.sin(around)])
+        towards = np.array([np.cos(height) * np.cos(around), np.sin(height),
+                            np.cos(height) * np.sin(around)])
         direction = np.stack(
             [np.sin(theta)[:, None] * np.cos(phi), up[..., 0], np.sin(theta)[:, None] * np.sin(phi)],
             -1,
         )
-        spread = np.radians(rng.uniform(2.5, 6))
-        angle = np.arccos(np.clip(direction @ sun, -1, 1))
+        spread = np.radians(rng.uniform(*sun))
+        angle = np.arccos(np.clip(direction @ towards, -1, 1))
         glow = np.exp(-0.5 * (angle / spread) ** 2)[..., None]
         warm = np.array([1.0, 0.6 + 0.35 * np.sin(height), 0.35 + 0.5 * np.sin(height)])
         picture = picture + glow * warm * rng.uniform(1.0, 2.5) / spread**2
-    return (picture * (strength or 10 ** rng.uniform(-0.3, 0.7))).astype(np.float32)
+    return (picture * 10 ** rng.uniform(-0.3, 0.7)).astype(np.float32)
