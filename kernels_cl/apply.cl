@@ -56,8 +56,7 @@ kernel void apply(
             real x = first == 0 && last == WIDTH - 1
                          ? read_guide(GUIDE_IMAGES, q, pixel, 0, WIDTH - 1)
                          : read_guide(GUIDE_IMAGES, q, pixel, first, last);
-            x -= shift[q];
-            x = 0 * x == 0 ? x : (real)0;
+            x = 0 * x == 0 ? from_shift(x, shift[q]) : (real)0;
 #pragma unroll
             for (int c = 0; c < C; ++c)
                 values[c] += x * (above[(q + 1) * C + c] + below * down[(q + 1) * C + c]);

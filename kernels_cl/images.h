@@ -105,6 +105,16 @@ INLINE real read_guide(GUIDE_PARAMETERS, int q, long pixel, int first, int last)
     return guide_lanes(guides_4 + pixel * PART_4, PART_4, q - END_3, first, last);
 }
 
+// A guide as the moments and the model take it: its distance from the shift, cut so that the sum
+// of squares stays a float.
+#define FARTHEST 1e17f
+INLINE real from_shift(real x, float shift)
+{
+    x -= shift;
+    x = x > FARTHEST ? (real)FARTHEST : x;
+    return x < -FARTHEST ? (real)-FARTHEST : x;
+}
+
 // One value of guide q. Lane 0 is enough to look at.
 INLINE float guide_value(GUIDE_PARAMETERS, int q, long pixel)
 {

@@ -72,9 +72,10 @@ kernel void moments(
 #endif
             one = zero == 0 ? one : (real)0;
 #pragma unroll
-            for (int q = 0; q < Q; ++q) x[q] = one > 0 ? x[q] - shift[q] : (real)0;
+            for (int q = 0; q < Q; ++q) x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
+            // Divided before they are summed: radiance near the largest float must not overflow.
 #pragma unroll
-            for (int c = 0; c < C; ++c) y_[c] = one > 0 ? y_[c] : (real)0;
+            for (int c = 0; c < C; ++c) y_[c] = one > 0 ? y_[c] * (1.0f / (BLOCK * BLOCK)) : (real)0;
 
 #ifdef WEIGHTED
 #define WEIGHTED_BY_ONE(v) (one * (v))
@@ -97,30 +98,35 @@ kernel void moments(
     }
 #pragma unroll
     for (int k = 0; k < K; ++k)
-        moments[((long)k * h + by) * pitch + bx] = lane_sum(sums[k]) / (BLOCK * BLOCK);
+        moments[((long)k * h + by) * pitch + bx] =
+            lane_sum(sums[k]) * (k < XY(0, 0) ? 1.0f / (BLOCK * BLOCK) : 1);
 }
 
 // The typical values `shift` about which the moments are taken, since in float the variance of a
 // guide far from zero would drown in the square of its mean: the mean over every step_y-th row and
-// step_x-th column of what is finite there. Any other value gives the same model.
+// step_x-th column, of what is there and less than FARTHEST. Any other value gives the same model.
 
-// One work-item per sampled row: the mean over it of each guide where finite, else 0, and the
-// share of finite values, go to partial (rows, Q, 2).
+// One work-item per sampled row: sum and count of each guide go to partial (rows, Q, 2).
 kernel void centre_rows(
-    int width, int rows, int step_x, int step_y, GUIDE_PARAMETERS, global float *partial)
+    int width, int rows, int step_x, int step_y, GUIDE_PARAMETERS, global const weight_t *weight,
+    global float *partial)
 {
-    const int row = get_global_id(0), samples = (width + step_x - 1) / step_x;
+    const int row = get_global_id(0);
     if (row >= rows) return;
     for (int q = 0; q < Q; ++q) {
         float sum = 0, count = 0;
         for (int x = 0; x < width; x += step_x) {
-            const float value = guide_value(GUIDE_IMAGES, q, (long)row * step_y * width + x);
-            // Divided before it is summed: values near the largest float must not overflow.
-            sum += 0 * value == 0 ? value / samples : 0;
-            count += 0 * value == 0 ? 1 : 0;
+            const long pixel = (long)row * step_y * width + x;
+            const float value = guide_value(GUIDE_IMAGES, q, pixel);
+            int counts = value < FARTHEST && value > -FARTHEST;
+#ifdef WEIGHTED
+            counts = counts && weight[pixel] > 0;
+#endif
+            sum += counts ? value : 0;
+            count += counts;
         }
         partial[(row * Q + q) * 2] = sum;
-        partial[(row * Q + q) * 2 + 1] = count / samples;
+        partial[(row * Q + q) * 2 + 1] = count;
     }
 }
 
@@ -131,8 +137,8 @@ kernel void centre(int rows, global const float *partial, global float *shift)
     if (q >= Q) return;
     float sum = 0, count = 0;
     for (int row = 0; row < rows; ++row) {
-        sum += partial[(row * Q + q) * 2] / rows;
-        count += partial[(row * Q + q) * 2 + 1] / rows;
+        sum += partial[(row * Q + q) * 2];
+        count += partial[(row * Q + q) * 2 + 1];
     }
-    shift[q] = count > 0 ? sum / count : 0;
+    shift[q] = sum / MAX(count, 1);
 }

@@ -6,8 +6,8 @@
 //   slopes = S R^-1 S cov(X, Y),   value = mean(Y) - slopes . mean(X - shift)
 //
 // mu is the mean of X itself; the covariance does not depend on the shift. R is solved by Cholesky
-// in private memory. A block without a single usable pixel in its window gets the model 0, a guide
-// that the earlier ones explain up to rounding gets slope 0.
+// in private memory. A block without a single usable pixel in its window, or whose moments overflowed,
+// gets the model 0; a guide that the earlier ones explain up to rounding gets slope 0.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -30,10 +30,12 @@ kernel void solve(
     const long block = (long)get_global_id(1) * pitch + get_global_id(0) * WIDTH;
     moments += block;
     model += block;
-#define MOMENT(k) (READ(moments + (k) * plane) * per_pixel)
-
     const real n = READ(moments);
-    const real per_pixel = n > 1e-12f ? 1 / n : (real)0;
+    real zero = 0;  // stays 0 unless a moment is not finite
+    for (int k = 0; k < K; ++k) zero += 0 * READ(moments + k * plane);
+    const mask filled = (n > 1e-12f) & (zero == 0);
+    const real per_pixel = filled ? 1 / n : (real)0;
+#define MOMENT(k) (filled ? READ(moments + (k) * plane) * per_pixel : (real)0)
 
     // Row by row: W, scaled to R, then factored in place, R = L L^T; b becomes L^-1 S cov(X, Y).
     real mean[Q + 1], scale[Q + 1], l[LOWER(Q, 0) + 1], inverse_diagonal[Q + 1], b[Q * C + 1];

@@ -11,10 +11,16 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import denoise, fit, info, metrics
+from jflnr.cli import denoise, devices, fit, info, metrics
 from jflnr.cli.common import INPUT_ERRORS, sentence
 
-COMMANDS = {"denoise": denoise, "info": info, "metrics": metrics, "fit": fit}
+COMMANDS = {
+    "denoise": denoise,
+    "info": info,
+    "metrics": metrics,
+    "fit": fit,
+    "devices": devices,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

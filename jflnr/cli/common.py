@@ -63,3 +63,13 @@ def metrics_table(measured: Mapping[str, Mapping[str, float | None]]) -> str:
     for image, values in measured.items():
         rows.append([image, *("-" if values[n] is None else f"{values[n]:.4g}" for n in names)])
     return table(rows)
+
+
+def profile_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Kernels as in the paper's table: time, bytes moved, share of what a copy kernel moves."""
+    cells = [["kernel", "ms", "MB moved", "of copy bandwidth"]]
+    cells += [
+        [row["kernel"], f"{row['ms']:.2f}", f"{row['bytes'] / 1e6:.1f}", f"{row['share']:.0%}"]
+        for row in rows
+    ]
+    return table(cells)

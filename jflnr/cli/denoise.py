@@ -19,7 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jflnr.cli.common import INPUT_ERRORS, guide_names, metrics_table, sentence, to_json
+from jflnr.cli.common import (
+    INPUT_ERRORS,
+    guide_names,
+    metrics_table,
+    profile_table,
+    sentence,
+    to_json,
+)
 from jflnr.cli.jobs import Job, make_folder, plan
 
 if TYPE_CHECKING:
@@ -43,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--reference", action="store_true", help="print metrics against the layer `reference`")
     add("--overwrite", action="store_true", help="replace outputs that exist")
     add("--json", action="store_true", help="print one JSON list instead of lines")
+    add("--profile", action="store_true", help="print the time of every OpenCL kernel")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -72,6 +80,8 @@ def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
 
     checks.choice("--method", arguments.method, METHODS)
     checks.choice("--backend", arguments.backend, BACKENDS)
+    if arguments.profile and arguments.backend != "opencl":
+        raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
     model, about = parameters.DEFAULT, dict[str, Any]()
     if arguments.params:
         model, about = parameters.load_parameters(arguments.params)
@@ -151,6 +161,12 @@ def _denoise(
         "compile_seconds": times[-2] - times[0],
         "warnings": [*{str(warning.message): None for warning in caught}, *_not_finite(frame)],
     }
+    if arguments.profile:
+        from jflnr.opencl.context import default_context
+        from jflnr.opencl.profile import profile
+
+        rows = profile(default_context(), lambda: denoise(frame, **settings))
+        record["profile"] = [row._asdict() for row in rows]
     if arguments.reference:
         noisy, denoised = measure(frame, frame.indirect), measure(frame, indirect)
         record["metrics"] = {"noisy": noisy, "denoised": denoised}
@@ -221,4 +237,8 @@ def _summary(record: dict[str, Any]) -> str:
     )
     if record["compile_seconds"]:
         text += f" (and {record['compile_seconds']:.1f} s to compile)"
-    return f"{text}\n{metrics_table(record['metrics'])}" if "metrics" in record else text
+    if "metrics" in record:
+        text += "\n" + metrics_table(record["metrics"])
+    if "profile" in record:
+        text += "\n" + profile_table(record["profile"])
+    return text

@@ -24,12 +24,19 @@ def guide_arguments(guides: tuple[Any, ...]) -> tuple[Any, ...]:
     return (*guides, *(None for _ in range(PARTS - len(guides))))
 
 
-def centre(context: Context, guides: tuple[Any, ...]) -> Any:
+def weight_defines(weight: Any | None) -> dict[str, int]:
+    """The defines of kernels_cl/moments.cl for weights `(H, W)`, float32 or bool, or None."""
+    if weight is None:
+        return {}
+    return {"WEIGHTED": 1, "MASKED": 1} if weight.dtype == bool else {"WEIGHTED": 1}
+
+
+def centre(context: Context, guides: tuple[Any, ...], weight: Any | None = None) -> Any:
     """A typical value of each guide, `(max(Q, 1),)`, from a sparse grid of pixels.
 
-    guides: device arrays `(H, W, Q_i)`.
+    guides: device arrays `(H, W, Q_i)`. weight: as in `collect`; pixels of weight 0 do not count.
     """
-    defines = {**guide_defines(guides, 1), "WIDTH": 1, "BLOCK": 1}
+    defines = {**guide_defines(guides, 1), **weight_defines(weight), "WIDTH": 1, "BLOCK": 1}
     count = defines["Q"]
     shift = context.empty((max(count, 1),))
     if count == 0:
@@ -38,7 +45,7 @@ def centre(context: Context, guides: tuple[Any, ...]) -> Any:
     step_y, step_x = (max(size // 32, 1) for size in (height, width))
     rows = -(-height // step_y)
     partial = context.empty((rows, count, 2))
-    arguments = (width, rows, step_x, step_y, *guide_arguments(guides), partial)
+    arguments = (width, rows, step_x, step_y, *guide_arguments(guides), weight, partial)
     context.run("centre_rows", "moments.cl", defines, (rows,), arguments)
     context.run("centre", "moments.cl", defines, (count,), (rows, partial, shift))
     return shift
@@ -62,9 +69,7 @@ def collect(
     defines = {**guide_defines(guides, channels), "BLOCK": block, "WIDTH": context.width(block)}
     if target.dtype == "float16":
         defines["HALF_TARGET"] = 1
-    if weight is not None:
-        defines["MASKED" if weight.dtype == bool else "WEIGHTED"] = 1
-        defines["WEIGHTED"] = 1
+    defines |= weight_defines(weight)
     h, w = -(-height // block), -(-width // block)
     pitch = -(-w // context.width()) * context.width()
     moments = context.empty((plane_count(defines["Q"], channels), h, pitch))

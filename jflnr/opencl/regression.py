@@ -51,8 +51,9 @@ def flr(
     x_map = x if guides_map is None else _layers(context, guides_map)
     output, result = _output(context, _shape(target, guides_map), out, on_device)
 
-    shift = centre(context, x)
-    moments = collect(context, y, x, shift, block, _weight(context, weight))
+    counts = _weight(context, weight)
+    shift = centre(context, x, counts)
+    moments = collect(context, y, x, shift, block, counts)
     step = block * factor
     moments = blur(context, moments, float(parameters.sigma) / step, reach=-(-support // step))
     model = solve(context, moments, shift, parameters, count, channels)

@@ -1,5 +1,7 @@
 """What surrounds the kernels: devices, reuse, determinism, results left on the device, errors."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -88,6 +90,6 @@ def test_no_device_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_pyopencl_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pyopencl", None)
+    monkeypatch.setitem(sys.modules, "pyopencl", None)
     with pytest.raises(NoDevice, match=r"jflnr\[opencl\]"):
         all_devices()

@@ -70,8 +70,11 @@ def test_centre(context: Context, offset: float) -> None:
     guides = scene(70, 131, 5, 3)[1] + np.float32(offset)
     guides[2, :9] = np.nan
     guides[:, :, 4] = np.inf
+    weight = np.arange(131)[None] + np.zeros((70, 1), np.float32) > 60
     found = centre(context, (context.array(guides),)).get()
     assert error(found, in_float64(jax_moments.centre)(guides)) < 1e-6
+    found = centre(context, (context.array(guides),), context.array(weight)).get()
+    assert error(found, in_float64(jax_moments.centre)(guides, weight)) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -86,10 +89,9 @@ def test_blur(context: Context, size: tuple[int, int], sigma: float, reach: int)
 
 @pytest.mark.parametrize("counts", [(4, 4), (5, 3), (12, 3)])
 def test_solve(context: Context, counts: tuple[int, int]) -> None:
-    # Independent guides: of dependent ones only what the model predicts is well determined.
+    # Independent guides: of others only what the model predicts is well determined.
     target = scene(64, 83, *counts)[0]
     guides = np.random.default_rng(0).normal(0, 1, (64, 83, counts[0])).astype(np.float32)
-    guides[..., 1] = 2  # flat
     shift = np.full(counts[0], 0.25, np.float32)
     moments = in_float64(jax_moments.collect, block=8)(target, guides, shift)
     moments = in_float64(jax_blur.blur, sigma=1.5, reach=5)(moments).astype(np.float32)

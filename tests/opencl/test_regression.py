@@ -87,6 +87,16 @@ def test_guides_far_from_zero(context: Context) -> None:
     assert compare(context, target, guides * 10 + np.float32(1e4)) < tolerances.WHOLE
 
 
+def test_extreme_values(context: Context) -> None:
+    target, guides = scene(60, 71, 5, 3)
+    guides[:8, :8, 3], guides[30:, 60, 1] = 1e30, -3e38
+    target[40, 40] = 3e38
+    found = flr(target, guides, PARAMETERS, context=context)
+    right = np.asarray(jax_flr(target, guides, PARAMETERS))
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(found, right, atol=1e-3 * abs(right).max())
+
+
 def test_nothing_usable_gives_zero(context: Context) -> None:
     target, guides = scene(20, 30, 5, 3)
     assert not flr(np.full_like(target, np.nan), guides, PARAMETERS, context=context).any()

@@ -1,0 +1,63 @@
+"""What is reported about devices and times."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr.cli import main
+from jflnr.opencl import Context, flr
+from jflnr.opencl.profile import profile
+from tests.opencl.conftest import PARAMETERS, scene
+
+
+def test_every_kernel_has_a_row(context: Context) -> None:
+    target, guides = scene(61, 203, 5, 3)
+    rows = {
+        row.kernel: row
+        for row in profile(
+            context, lambda: flr(target, guides, PARAMETERS, context=context), repeats=2
+        )
+    }
+    kernels = ["centre_rows", "centre", "moments", "blur_columns", "blur_rows", "solve", "apply"]
+    assert list(rows) == [*kernels, "all kernels", "copy"]
+    assert all(row.ms >= 0 and row.bytes > 0 for row in rows.values())
+    assert rows["copy"].share == 1
+    # Every byte of the frame is counted once: target and guides in, moments out, and the shift.
+    h, pitch = 8, -(-26 // context.width()) * context.width()
+    moments = 39 * h * pitch * 4
+    assert rows["moments"].bytes == target.nbytes + guides.nbytes + moments + 5 * 4
+    assert context.launches is None
+
+
+def test_devices_command(context: Context, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["devices"]) == 0
+    assert context.device.name.strip() in capsys.readouterr().out
+    assert main(["devices", "--json"]) == 0
+    backends = [row["backend"] for row in json.loads(capsys.readouterr().out)]
+    assert "jax" in backends and "opencl 0" in backends
+
+
+def test_devices_command_without_opencl(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyopencl", None)
+    assert main(["devices"]) == 0
+    assert "pip install 'jflnr[opencl]'" in capsys.readouterr().out
+
+
+def test_denoise_backend(
+    context: Context, frame: jflnr.Frame, frame_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["denoise", str(frame_file), "-o", str(frame_file.with_name("out.exr"))]
+    assert main([*command, "--backend", "opencl", "--profile"]) == 0
+    assert "blur_columns" in capsys.readouterr().out
+    assert main([*command, "--profile", "--overwrite"]) == 2
+    assert "--backend opencl" in capsys.readouterr().err
+    by_jax, by_opencl = (
+        np.asarray(jflnr.denoise(frame, backend=name)) for name in ("jax", "opencl")
+    )
+    np.testing.assert_allclose(by_opencl, by_jax, atol=1e-4 * by_jax.max())
