@@ -53,7 +53,7 @@ def main(argv: list[str]) -> int:
 def _module(name: str) -> results.Experiment:
     if name not in NAMES:
         raise ValueError(f"{name!r} is none of the experiments: {', '.join(NAMES)}")
-    return importlib.import_module(f"experiments.{name}")  # type: ignore[return-value]
+    return importlib.import_module(f"experiments.{name}")
 
 
 def _parser() -> argparse.ArgumentParser:

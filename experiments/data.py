@@ -28,6 +28,11 @@ def frames(*splits: str) -> list[Path]:
     return found
 
 
+def one_view_each(split: str) -> list[Path]:
+    """The first frame of each scene of a split."""
+    return list({path.stem.rsplit("_", 1)[0]: path for path in frames(split)[::-1]}.values())[::-1]
+
+
 def label(path: Path) -> str:
     """split/scene_view, as in the published baselines."""
     return f"{path.parent.name}/{path.stem}"

@@ -39,7 +39,7 @@ def run(quick: bool) -> dict[str, Any]:
         return [quick_psnr(frame, by_name[name](frame)) for frame in frames]
 
     found = resume.rows(f"{NAME}{'-quick' * quick}", list(by_name), accuracy)
-    clock = times(methods, frames[0], quick, repeats=4)
+    clock = times(methods, frames[0], quick, repeats=2)
     rows: list[dict[str, Any]] = [
         {"method": m.name, "family": m.family, "psnr": float(np.mean(values))} | clock[m.name]
         for m, values in zip(methods, found, strict=True)

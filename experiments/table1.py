@@ -49,7 +49,7 @@ def run(quick: bool) -> dict[str, Any]:
     found = resume.rows(f"{NAME}{'-quick' * quick}", [str(path) for path in paths], on_frame)
     frames = [row for rows in found for row in rows]
     timed = [m for m in methods if m.family not in ("input", "Figure 3")]
-    clock = times(timed, data.read(paths[0]), quick, repeats=3)
+    clock = times(timed, data.read(paths[0]), quick, repeats=2)
     means = [mean_of(frames, m.name) | clock.get(m.name, {}) for m in methods]
     basis = next(row for row in means if row["method"] == "Figure 3")["mse_unbiased"]
     for row in means:

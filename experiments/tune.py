@@ -24,12 +24,12 @@ SEARCH: dict[str, tuple[Denoiser, Mapping[str, Any], dict[str, tuple[Any, ...]]]
     "guided filter": (
         guided.denoise,
         guided.TUNED,
-        {"guides": GUIDES, "radius": (16, 24, 32, 48), "eps": (1e-3, 3e-3, 1e-2, 3e-2)},
+        {"guides": GUIDES, "radius": (16, 24, 36), "eps": (1e-3, 3e-3, 1e-2, 3e-2)},
     ),
     "fast guided filter": (
         guided.denoise,
         guided.FAST_TUNED,
-        {"radius": (16, 24, 32, 48), "eps": (1e-3, 3e-3, 1e-2, 3e-2), "subsample": (4, 8)},
+        {"radius": (16, 24, 36), "eps": (1e-3, 3e-3, 1e-2, 3e-2), "subsample": (4, 8)},
     ),
     "a-trous": (
         atrous.denoise,
@@ -39,20 +39,19 @@ SEARCH: dict[str, tuple[Denoiser, Mapping[str, Any], dict[str, tuple[Any, ...]]]
     "SVGF, spatial": (
         svgf.denoise,
         svgf.TUNED,
-        {"sigma_l": (4, 16, 64, 1e3), "sigma_n": (8, 32, 128), "sigma_z": (0.3, 1.0, 4.0, 16.0)},
+        {"sigma_l": (16, 64, 1e3), "sigma_n": (8, 32, 128), "sigma_z": (1.0, 4.0, 16.0)},
     ),
     "BMFR, one frame": (
         bmfr.denoise,
         bmfr.TUNED,
         {
-            "block": (32, 48, 64, 96),
+            "block": (32, 64),
             "features": (
                 ("normal", "position", "position2"),
                 ("normal", "position"),
-                ("normal", "depth", "ao"),
                 ("normal", "position", "ao"),
             ),
-            "noise": (0.01, 0.1, 0.3),
+            "noise": (0.01, 0.1),
         },
     ),
 }
