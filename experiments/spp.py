@@ -27,7 +27,7 @@ METRICS = ("psnr", "ssim", "flip", "rmse")
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """Mean metrics over a view of each test scene for each number of samples; NFOR where there are halves."""
+    """Mean metrics over a view of each test scene; NFOR where there are two halves."""
     tag = "-quick" * quick
     budgets = ["1"] if quick else list(STREAMS)
     shipped = [data.SHIPPED]
