@@ -15,13 +15,16 @@ import numpy as np
 
 from jflnr import checks
 from jflnr import guides as guide_layers
+from jflnr.flr.adaptive import flr_adaptive
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
+from jflnr.flr.noisy_guides import smooth_guide
 from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.regression import flr
 from jflnr.frame import Array, Frame
 
 # Pixels on a side that share one model: the size the paper found to lose nothing.
 BLOCK = 8
-METHODS = ("flr",)
+METHODS = ("flr", "flr-adaptive")
 SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 BACKENDS = ("jax", "opencl")
 
@@ -32,17 +35,20 @@ def denoise(
     *,
     backend: str = "jax",
     guides: Sequence[str] | None = None,
-    parameters: Parameters | None = None,
+    parameters: Parameters | AdaptiveParameters | None = None,
     block: int = BLOCK,
+    keep_energy: bool = False,
 ) -> Array:
     """Denoise the indirect light of a frame.
 
     frame: as from `read_frame`. Its `indirect` may have any number of channels C: several light
     groups side by side are denoised together, and their results sum to the denoised sum. It may
     also be smaller than the other layers by a whole factor; the result then has their size.
-    method: one of `METHODS`. guides: names out of normal, depth, ao, position, albedo; by default
-    normal, depth and, where the frame has it, ao. parameters: the fitted defaults if None.
+    method: `flr` (section 3.2 of the paper) or `flr-adaptive` (docs/adaptive.md).
+    guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
+    the frame has it, ao. parameters: of the method; the fitted defaults if None.
     block: pixels on a side that share one model.
+    keep_energy: for `flr-adaptive`, keep the mean radiance exactly instead of nearly.
     Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
     Returns `(H, W, C)` float32, demodulated indirect radiance.
 
@@ -63,14 +69,30 @@ def denoise(
         )
     if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
         raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
-    parameters = DEFAULT if parameters is None else parameters
-    support = _support(parameters)
+    if method == "flr-adaptive":
+        settings = _parameters(parameters, ADAPTIVE_DEFAULT)
+        if backend != "jax":
+            raise ValueError("method flr-adaptive runs on the jax backend only")
+        if inputs.indirect.shape[:2] != inputs.normal.shape[:2]:
+            raise ValueError("method flr-adaptive needs frame.indirect at the size of the guides")
+        return _denoise_adaptive(inputs, settings, names, block, keep_energy)
+    settings = _parameters(parameters, DEFAULT)
+    support = _support(settings, max(inputs.normal.shape[:2]))
     if backend == "opencl":
         from jflnr import opencl
 
         images, coarse_block = _images(inputs, names), _coarse_block(inputs, block)
-        return opencl.flr(parameters=parameters, block=coarse_block, support=support, **images)
-    return _denoise(inputs, parameters, names, block, support)
+        return opencl.flr(parameters=settings, block=coarse_block, support=support, **images)
+    return _denoise(inputs, settings, names, block, support)
+
+
+def _parameters(given: Any, default: Any) -> Any:
+    if given is not None and type(given) is not type(default):
+        raise TypeError(
+            f"parameters must be {type(default).__name__} for this method; "
+            f"got {type(given).__name__}"
+        )
+    return default if given is None else given
 
 
 def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
@@ -93,11 +115,15 @@ def _check_sizes(frame: Frame) -> None:
         )
 
 
-def _support(parameters: Parameters) -> int:
-    """Three standard deviations, in steps of 24 pixels so that few programs are compiled."""
+def _support(parameters: Parameters, longest: int) -> int:
+    """Three standard deviations, in steps of 24 pixels so that few programs are compiled.
+
+    No farther than the frame's longest side, whatever a parameter file says.
+    """
     if isinstance(parameters.log_sigma, jax.core.Tracer):
         return 72
-    return 24 * max(int(np.ceil(float(parameters.sigma) * 3 / 24)), 1)
+    reach = min(float(parameters.sigma) * 3, longest)
+    return 24 * max(int(np.ceil(reach / 24)), 1)
 
 
 def _coarse_block(frame: Frame, block: int) -> int:
@@ -130,3 +156,21 @@ def _denoise(
 ) -> jax.Array:
     block = _coarse_block(frame, block)
     return flr(parameters=parameters, block=block, support=support, **_images(frame, names))
+
+
+@functools.partial(jax.jit, static_argnames=("names", "block", "keep_energy"))
+def _denoise_adaptive(
+    frame: Frame,
+    parameters: AdaptiveParameters,
+    names: tuple[str, ...],
+    block: int,
+    keep_energy: bool,
+) -> jax.Array:
+    images = _images(frame, names)
+    if "ao" in names:
+        ao = names.index("ao")
+        normal, depth = jnp.asarray(frame.normal), jnp.asarray(frame.depth)
+        layers = list(images["guides"])
+        layers[ao] = smooth_guide(layers[ao], normal, depth)
+        images["guides"] = tuple(layers)
+    return flr_adaptive(parameters=parameters, block=block, keep_energy=keep_energy, **images)

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("inputs", metavar="IN", nargs="+", type=Path, help="EXR frames, or folders of them")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="file or folder to write")
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
-    add("--method", default="flr", help="the denoiser (flr)")
+    add("--method", default="flr", help="flr or flr-adaptive (flr)")
     add("--backend", default="jax", help="what runs it: jax or opencl (jax)")
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--params", type=Path, metavar="FILE", help="parameters that `jflnr fit` wrote")
@@ -82,6 +82,8 @@ def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
     checks.choice("--backend", arguments.backend, BACKENDS)
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
+    if arguments.method != "flr":
+        return _settings_of_another(arguments)
     model, about = parameters.DEFAULT, dict[str, Any]()
     if arguments.params:
         model, about = parameters.load_parameters(arguments.params)
@@ -95,6 +97,22 @@ def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
         "parameters": parameters.Parameters.of(**values),
         "guides": _guides(about) if arguments.guides is None else arguments.guides,
         "block": about.get("block", BLOCK) if arguments.block is None else arguments.block,
+    }
+
+
+def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
+    """As `_settings`, for methods that have no sigma, eps and eps' to set."""
+    from jflnr.denoising import BLOCK
+
+    for name in ("params", "sigma", "eps", "eps_prime"):
+        if getattr(arguments, name) is not None:
+            option = name.replace("_", "-")
+            raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
+    return {
+        "method": arguments.method,
+        "backend": arguments.backend,
+        "guides": arguments.guides,
+        "block": BLOCK if arguments.block is None else arguments.block,
     }
 
 
@@ -197,16 +215,15 @@ def _about(frame: "Frame", settings: dict[str, Any], spp: int) -> dict[str, Any]
     """What was done, for the record and for the header of the output."""
     from jflnr.guides import choose
 
-    model = settings["parameters"]
+    model = settings.get("parameters")
+    names = ("sigma", "eps", "eps_prime") if model else ()
     return {
         "method": settings["method"],
         "backend": settings["backend"],
         "spp": spp,
         "guides": list(choose(frame, settings["guides"])),
-        "sigma": float(model.sigma),
-        "eps": float(model.eps),
-        "eps_prime": float(model.eps_prime),
         "block": settings["block"],
+        **{name: float(getattr(model, name)) for name in names},
     }
 
 
