@@ -118,3 +118,14 @@ def test_gradients_reach_the_parameters(frame):
 def test_wrong_input_is_named(frame, layers, options, words):
     with pytest.raises(ValueError, match=words):
         jflnr.denoise(changed(frame, **layers), **options)
+
+
+def test_the_adaptive_method_is_better_on_the_shipped_frame():
+    frame = jflnr.read_frame(denoising.SHIPPED_FRAME)
+    plain, adaptive = (psnr(frame, jflnr.denoise(frame, method)) for method in jflnr.METHODS)
+    assert adaptive > plain + 0.5
+
+
+def test_parameters_of_another_method_are_refused(frame):
+    with pytest.raises(TypeError, match="parameters must be AdaptiveParameters"):
+        jflnr.denoise(frame, "flr-adaptive", parameters=jflnr.Parameters.of(8, 1e-3, 1e-3))
