@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +22,7 @@ NAME = "speed"
 QUESTION = "How many times the memory floor does FLR take, and how much less than OIDN?"
 
 WIDTH, HEIGHT = 1920, 1080
-OIDN = {
+OIDN: dict[str, dict[str, Any]] = {
     "OIDN fast": {"quality": "fast", "clean": False},
     "OIDN high": {"quality": "high", "clean": False},
     "OIDN high, clean auxiliaries": {"quality": "high", "clean": True},
@@ -35,12 +36,12 @@ def run(quick: bool) -> dict[str, Any]:
     methods = methods_on(frame)
     seconds = interleaved(methods, repeats)
     floor = seconds["memory floor"]
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"method": name, "ms": 1e3 * t, "floors": t / floor, "per_flr": t / seconds["flr, JAX"]}
         for name, t in seconds.items()
     ]
     for row in rows:
-        print("  {method}: {ms:.1f} ms, {floors:.1f} x the floor".format(**row), flush=True)
+        print(f"  {row['method']}: {row['ms']:.1f} ms, {row['floors']:.1f} x the floor", flush=True)
     sizes = (0.25, 1, 2) if quick else (0.25, 0.5, 1, 2, 4, 8, 16, 33)
     return {
         "methods": rows,
@@ -64,14 +65,15 @@ def methods_on(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
         "flr, JAX": lambda: compiled(noisy, guides, DEFAULT).block_until_ready(),
     }
     for method in jflnr.METHODS:
-        calls[f"denoise {method}, JAX"] = lambda method=method: jax.block_until_ready(
-            jflnr.denoise(on_device, method)
-        )
-        if "opencl" in jflnr.BACKENDS:
-            calls[f"denoise {method}, OpenCL"] = lambda method=method: jflnr.denoise(
-                frame, method, backend="opencl"
-            )
+        denoise = functools.partial(jflnr.denoise, on_device, method)
+        calls[f"denoise {method}, JAX"] = functools.partial(finished, denoise)
+    calls["denoise flr, OpenCL"] = functools.partial(jflnr.denoise, frame, backend="opencl")
     return calls | oidn_calls(frame)
+
+
+def finished(call: Callable[[], Any]) -> Any:
+    """The result of a call, waited for."""
+    return jax.block_until_ready(call())
 
 
 def oidn_calls(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
@@ -135,6 +137,7 @@ def memory() -> dict[str, float]:
     """Memory that the compiled program takes beside its input and output, per byte of input."""
     y, x = synthetic(2.0736, 5, 3)
     analysis = jax.jit(flr).lower(y, x, DEFAULT).compile().memory_analysis()
+    assert analysis is not None
     inputs = y.nbytes + x.nbytes
     return {
         "input_mb": inputs / 1e6,

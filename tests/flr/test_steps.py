@@ -74,7 +74,7 @@ def test_linear_steps_have_their_adjoint(rng):
         shift = jnp.zeros(2)
         planes = jnp.asarray(rng.standard_normal((4, 6, 5)))
         coefficients = jnp.asarray(rng.standard_normal((3, 3, 4, 5)))
-        target_moments = lambda t: collect(t, x, shift, 4)[index_xy(0, 0, 2, 3) :]  # noqa: E731
+        target_moments = lambda t: collect(t, x, shift, 4)[index_xy(0, 0, 2, 3) :]
         assert adjoint_error(target_moments, y, rng) < 1e-12
         assert adjoint_error(lambda m: blur(m, 1.5, 4), planes, rng) < 1e-12
         assert adjoint_error(lambda c: apply(c, x, shift, 4), coefficients, rng) < 1e-12
@@ -88,7 +88,7 @@ def test_solvers_against_numpy(rng, solver, size):
     root = np.sqrt(np.diagonal(matrix, axis1=1, axis2=2))
     matrix /= root[:, :, None] * root[:, None]
     right = rng.standard_normal((6, size, 3))
-    planes = lambda a: jnp.asarray(np.moveaxis(a, 0, -1)[..., None])  # noqa: E731
+    planes = lambda a: jnp.asarray(np.moveaxis(a, 0, -1)[..., None])
     with jax.enable_x64(True):
         ours = np.asarray(solver(planes(matrix), planes(right)))[..., 0]
     np.testing.assert_allclose(np.moveaxis(ours, -1, 0), np.linalg.solve(matrix, right), atol=1e-9)
