@@ -9,19 +9,19 @@ signal. Pass 3 evaluates the models. docs/adaptive.md derives the steps.
 
 from __future__ import annotations
 
-
 import jax
 import jax.numpy as jnp
 
 from jflnr import checks
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.apply import apply
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
 from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, predict
 from jflnr.flr.merge import interpolate, signal_share
 from jflnr.flr.moments import Guides, centre, collect, index_xy
-from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.pyramid import double, halve
+from jflnr.flr.weighted_moments import collect_weighted
 
 BLOCK = 4
 LEVELS = 4
@@ -59,8 +59,8 @@ def flr_adaptive(
 
     moments = collect(light[..., None], guides, shift, 2 * block, weight)
     mean = _frame_mean(moments, shift.size)
-    weights, noise = _weights(light, guides, shift, moments, mean, weight, numbers, block)
-    grid = Grid(collect(target, guides, shift, block, weights), noise, block)
+    weights, squares = _weights(light, guides, shift, moments, mean, weight, numbers, block)
+    grid = Grid(*collect_weighted(target, guides, shift, weights, squares, block), block)
     coefficients = _fit_pyramid(grid, shift, target.shape[-1], levels, mean, numbers)
     coefficients = restore(coefficients, moments, shift.size, numbers.slack)
     image = apply(coefficients, guides, shift, block)
@@ -83,11 +83,11 @@ def _weights(
     numbers: AdaptiveParameters,
     block: int,
 ) -> tuple[jax.Array, jax.Array]:
-    """Each pixel's weight from a first fit of the brightness, and the noise it leaves.
+    """Each pixel's weight from a first fit of the brightness, and the noise that leaves.
 
     The variance of a pixel grows with its brightness, and the best weight is one over it.
     light: `(H, W)`. moments: of `light`, on blocks twice as large as `block`.
-    Returns the weights `(H, W)` and their squared weighted residuals, `(1, h, w)` block means.
+    Returns the weights `(H, W)`, 0 where a pixel cannot be used, and the squared weighted residuals.
     """
     grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
     features = _guide_features(grid, shift.size, numbers)
@@ -96,11 +96,14 @@ def _weights(
     # The floor is there for the derivative of the power at 0.
     relative = jnp.maximum(expected / mean, 1e-6)
     weights = 1 / (relative**numbers.exponent + numbers.offset)
+    usable = jnp.isfinite(light)
+    for layer in jax.tree.leaves(guides):
+        usable &= jnp.all(jnp.isfinite(layer), axis=-1)
     if weight is not None:
-        weights = jnp.where(weight > 0, weights * weight, 0)
-    residual = jnp.where(jnp.isfinite(light), light - expected, 0)
-    squares = jnp.where(jnp.isfinite(weights), weights, 0) * residual
-    return weights, collect((squares**2)[..., None], (), jnp.zeros(0), block)[1:]
+        usable &= (weight > 0) & jnp.isfinite(weight)
+        weights *= weight
+    weights = jnp.where(usable, weights, 0)
+    return weights, jnp.where(usable, weights * (light - expected), 0) ** 2
 
 
 def _fit_pyramid(

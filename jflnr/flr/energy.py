@@ -11,7 +11,7 @@ from jflnr.flr.pyramid import halve
 
 
 def restore(
-    coefficients: jax.Array, moments: jax.Array, guides: int, slack: jax.Array
+    coefficients: jax.Array, moments: jax.Array, guides: int, slack: jax.Array | float
 ) -> jax.Array:
     """Scale the models block by block so that the frame's brightness is close to the input's.
 

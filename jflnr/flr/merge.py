@@ -16,13 +16,13 @@ def signal_share(
     coarse: Fit,
     window: Window,
     reference: jax.Array,
-    caution: jax.Array,
+    caution: jax.Array | float,
 ) -> jax.Array:
     """The share of signal in the difference d between two levels, `(h, w)` in [0, 1].
 
     If the coarser window were unbiased it would be the efficient estimate, and the variance of d
     would be the difference N of the two variances (Hausman 1978). What mean(d^2) over the
-    neighbourhood has beyond N is signal, and the Wiener filter keeps that share of d. The increments
+    neighbourhood has beyond N is signal, and the Wiener filter keeps that share of d. Increments
     of nested efficient estimates do not correlate, so each level is judged by itself.
 
     grid, fine: the finer level. coarse: the coarser one, interpolated to the finer grid. window: of

@@ -32,7 +32,7 @@ class Window(NamedTuple):
         return Window(self.rows**2, self.columns**2)
 
 
-def window_over(features: jax.Array, sigma: jax.Array) -> Window:
+def window_over(features: jax.Array, sigma: jax.Array | float) -> Window:
     """The weights between blocks.
 
     features: `(F, h, w)`, scaled so that a distance of 1 is one standard deviation; with F = 0
@@ -41,7 +41,7 @@ def window_over(features: jax.Array, sigma: jax.Array) -> Window:
     return Window(_line_weights(features, sigma, 2), _line_weights(features, sigma, 1))
 
 
-def _line_weights(features: jax.Array, sigma: jax.Array, axis: int) -> jax.Array:
+def _line_weights(features: jax.Array, sigma: jax.Array | float, axis: int) -> jax.Array:
     moved = _moved(features, axis)
     distance = jnp.stack([jnp.sum((other - features) ** 2, axis=0) for other in moved])
     along = _offsets(features.dtype) / jnp.maximum(sigma, 1e-2)
@@ -54,7 +54,7 @@ def gather(planes: jax.Array, window: Window) -> jax.Array:
 
 
 def gather_moments(
-    moments: jax.Array, window: Window, unit: jax.Array, guides: int, channels: int
+    moments: jax.Array, window: Window, unit: jax.Array | float, guides: int, channels: int
 ) -> jax.Array:
     """Moments over the window, with the position in it as two further guides.
 

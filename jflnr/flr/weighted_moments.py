@@ -1,0 +1,73 @@
+"""Moments of weighted pixels (section 3.2, kernel 1, with the weights of Eq. 9).
+
+The same sums as `moments.collect` with a weight per pixel, and in the same order. Here the weighted
+guides stay in the cache while their products are formed, which counts because every pixel has one.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from jflnr.flr.moments import Guides, planes
+
+
+def collect_weighted(
+    target: jax.Array,
+    guides: Guides,
+    shift: jax.Array,
+    weight: jax.Array,
+    squares: jax.Array,
+    block: int,
+) -> tuple[jax.Array, jax.Array]:
+    """Mean over each block of the weighted outer products of [1, X - shift, Y], and of `squares`.
+
+    target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`. weight: `(H, W)`, finite and not
+    negative, 0 where a pixel is not to be used. squares: `(H, W)`, finite.
+    Returns `(K, ceil(H/block), ceil(W/block))` and `(1, ceil(H/block), ceil(W/block))`.
+    """
+    inputs = (target, guides, weight, squares)
+    # Two rows of blocks at a time: enough work for one step, little enough for the cache.
+    rows = 2 * block
+    missing = -target.shape[0] % rows
+
+    def strips(image: jax.Array) -> jax.Array:
+        image = jnp.pad(image, [(0, missing)] + [(0, 0)] * (image.ndim - 1))
+        return image.reshape(-1, rows, *image.shape[1:])
+
+    def one(strip: tuple[jax.Array, Guides, jax.Array, jax.Array]) -> jax.Array:
+        return _strip(*strip, shift=shift, block=block)
+
+    sums = lax.map(one, jax.tree.map(strips, inputs))
+    moments = jnp.moveaxis(sums, 0, 1).reshape(sums.shape[1], -1, sums.shape[-1])
+    moments = moments[:, : -(-target.shape[0] // block)]
+    return moments[:-1], moments[-1:]
+
+
+def _strip(
+    target: jax.Array,
+    guides: Guides,
+    weight: jax.Array,
+    squares: jax.Array,
+    *,
+    shift: jax.Array,
+    block: int,
+) -> jax.Array:
+    """Moments of some rows of blocks: `(rows, W, ...)` to `(K + 1, rows / block, w)`."""
+    used = weight > 0
+    x = [jnp.where(used, plane - s, 0) for plane, s in zip(planes(guides), shift, strict=True)]
+    y = [jnp.where(used, plane, 0) for plane in planes(target)]
+    weighted = [weight, *(weight * plane for plane in x)]
+    weighted, x, y = lax.optimization_barrier((weighted, x, y))
+    products = [weight]
+    for i in range(1, len(weighted)):
+        products += [weighted[i], *(weighted[i] * x[j] for j in range(i))]
+    products += [a * b for a in weighted for b in y]
+    products.append(squares)
+    # Rows first: contiguous additions; then the columns, with fewer data.
+    sums = [jnp.sum(p.reshape(-1, block, p.shape[1]), axis=1) for p in products]
+    together = lax.optimization_barrier(jnp.stack(sums))
+    together = jnp.pad(together, ((0, 0), (0, 0), (0, -weight.shape[1] % block)))
+    together = together.reshape(*together.shape[:2], -1, block)
+    return jnp.sum(together, axis=-1) / block**2
