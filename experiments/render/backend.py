@@ -9,7 +9,13 @@ import warnings
 from functools import cache
 
 OLDEST_LLVM = 16  # 14 and 15 abort the whole process
-FOLDERS = ("/usr/lib/*-linux-gnu", "/usr/lib/llvm-*/lib", "/usr/lib64", "/usr/local/lib", "/opt/*/lib")
+FOLDERS = (
+    "/usr/lib/*-linux-gnu",
+    "/usr/lib/llvm-*/lib",
+    "/usr/lib64",
+    "/usr/local/lib",
+    "/opt/*/lib",
+)
 
 
 def find_llvm() -> str | None:
@@ -49,8 +55,8 @@ def start(threads: int | None = None, variant: str | None = None) -> str:
     chosen = variant or ("cuda_ad_rgb" if _has_gpu() else "llvm_ad_rgb" if llvm else "scalar_rgb")
     if chosen == "scalar_rgb" and variant is None:
         warnings.warn(
-            f"no GPU and no libLLVM of version {OLDEST_LLVM} or later was found (Debian: libllvm19;"
-            " or name it in DRJIT_LIBLLVM_PATH): rendering with scalar_rgb, about 1000 times slower",
+            f"no GPU and no libLLVM of version {OLDEST_LLVM} or later was found (Debian: libllvm19,"
+            " or name one in DRJIT_LIBLLVM_PATH): scalar_rgb renders about 1000 times slower",
             stacklevel=2,
         )
     if threads:

@@ -35,9 +35,7 @@ class Camera:
         x = tan(radians(self.fov_x) / 2)
         return x, x * height / width
 
-    def project(
-        self, points: NDArray[np.float64], width: int, height: int
-    ) -> NDArray[np.float64]:
+    def project(self, points: NDArray[np.float64], width: int, height: int) -> NDArray[np.float64]:
         """Pixel coordinates `(..., 2)` of world points `(..., 3)`; a pixel's centre is at .5."""
         local = (np.asarray(points, float) - self.to_world[:3, 3]) @ self.to_world[:3, :3]
         sx, sy = self.slopes(width, height)

@@ -1,12 +1,12 @@
 """`python -m experiments render`: frames of our scenes or of any Mitsuba 3 XML, and data sets.
 
-    render SCENE -o FILE.exr     one view of `room`, `FAMILY-SEED`, a shared scene, or an XML file
-    render SCENE -o FOLDER --views N        its camera where it has one, else N random views
-    render SCENE -o FOLDER --motion camera|light|object --frames N      a sequence
-    render families [-o docs/scenes.png]    one scene of each family on a contact sheet
-    render data [--folder cache/frames] [--frames 400]      training frames; resumes
-    render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
-    render efficiency [SCENE...]            samples a second, variance x seconds of each sampling
+render SCENE -o FILE.exr     one view of `room`, `FAMILY-SEED`, a shared scene, or an XML file
+render SCENE -o FOLDER --views N        its camera where it has one, else N random views
+render SCENE -o FOLDER --motion camera|light|object --frames N      a sequence
+render families [-o docs/scenes.png]    one scene of each family on a contact sheet
+render data [--folder cache/frames] [--frames 400]      training frames; resumes
+render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
+render efficiency [SCENE...]            samples a second, variance x seconds of each sampling
 """
 
 from __future__ import annotations
@@ -45,8 +45,13 @@ def _parser(verb: str) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--threads", type=int, help="CPU threads; all by default")
-    {"one": _one, "families": _families, "data": _data, "statistics": _statistics,
-     "efficiency": _efficiency}[verb](parser)
+    {
+        "one": _one,
+        "families": _families,
+        "data": _data,
+        "statistics": _statistics,
+        "efficiency": _efficiency,
+    }[verb](parser)
     return parser
 
 

@@ -16,7 +16,11 @@ from experiments.render.source import RANDOM, Source, load
 from experiments.render.splits import TEST, TRAIN_ROOMS, VAL, check_split
 from experiments.scenes.catalogue import FAMILIES
 
-NOISY = {"train": (1, 2, 4, 8, 16), "val": (1, 2, 4, 8, 16, 32, 64), "test": (1, 2, 4, 8, 16, 32, 64)}
+NOISY = {
+    "train": (1, 2, 4, 8, 16),
+    "val": (1, 2, 4, 8, 16, 32, 64),
+    "test": (1, 2, 4, 8, 16, 32, 64),
+}
 REALISATIONS = 4
 ERROR = {"train": 0.06, "val": 0.02, "test": 0.02}
 SECONDS_PER_PIXEL = 75 / (320 * 184)  # at most, for a reference
@@ -141,5 +145,3 @@ def _render(folder: Path, manifest: Manifest, job: Job, source: Source) -> bool:
 
 def _without_matrix(facts: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in facts.items() if k != "camera_to_world"}
-
-

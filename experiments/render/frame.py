@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -106,7 +104,9 @@ def header(camera: Camera, settings: Settings, ao_distance: float) -> dict[str, 
     }
 
 
-def write(path: Path, layers: Layers, facts: dict[str, Any], leave_out: tuple[str, ...] = ()) -> None:
+def write(
+    path: Path, layers: Layers, facts: dict[str, Any], leave_out: tuple[str, ...] = ()
+) -> None:
     """Write a frame as EXR, atomically: depth in float, the rest in half."""
     largest = float(np.finfo(np.float16).max)
     channels = {}

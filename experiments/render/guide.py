@@ -49,7 +49,9 @@ class Table:
         )
         index = mi.UInt32(index)
         high = dr.gather(mi.Float, self.cumulative, base + index)
-        low = dr.select(index > 0, dr.gather(mi.Float, self.cumulative, base + index - 1, index > 0), 0)
+        low = dr.select(
+            index > 0, dr.gather(mi.Float, self.cumulative, base + index - 1, index > 0), 0
+        )
         width = dr.maximum(high - low, 1e-7)
         inside = dr.clip((point.x - low) / width, 0, 1 - 2.0**-24)
         row = index // SIDE
@@ -89,7 +91,7 @@ class Guide:
 
     @classmethod
     def of(cls, width: int, height: int, position: NDArray[np.float32], mask: Any) -> Guide:
-        """For a view whose primary hits `position` `(H, W, 3)` lie where `mask` `(H, W)` is true."""
+        """For a view of primary hits `position` `(H, W, 3)`, where `mask` `(H, W)` is true."""
         rows, columns = -(-height // TILE), -(-width // TILE)
         lane = dr.arange(mi.UInt32, width * height)
         w, across = dr.opaque(mi.UInt32, width), dr.opaque(mi.UInt32, columns)

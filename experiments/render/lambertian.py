@@ -57,9 +57,7 @@ def _ball(matrix: NDArray[np.float64], radius: float, name: str) -> Element:
     values = " ".join(f"{v:.9g}" for v in matrix.ravel())
     ElementTree.SubElement(transform, "matrix", value=values)
     material = ElementTree.SubElement(shape, "bsdf", type="diffuse")
-    texture = ElementTree.SubElement(
-        material, "texture", type="checkerboard", name="reflectance"
-    )
+    texture = ElementTree.SubElement(material, "texture", type="checkerboard", name="reflectance")
     ElementTree.SubElement(texture, "rgb", name="color0", value="0.7 0.2 0.05")
     ElementTree.SubElement(texture, "rgb", name="color1", value="0.6 0.6 0.55")
     uv = ElementTree.SubElement(texture, "transform", name="to_uv")
@@ -121,7 +119,9 @@ def _base(material: Element) -> Element | None:
 def _replace(material: Element) -> None:
     base = _base(material)
     assert base is not None
-    named = {child.get("name"): child for child in base if child.tag in ("rgb", "texture", "spectrum")}
+    named = {
+        child.get("name"): child for child in base if child.tag in ("rgb", "texture", "spectrum")
+    }
     colour = next((named[name] for name in COLOURS if name in named), None)
     if colour is None:
         colour = ElementTree.Element("rgb", value=GREY)

@@ -2,8 +2,8 @@
 
 Four replicates are summed, each a scrambled (0,2)-sequence of its own. The first two make
 `reference_a`. The spread of the four gives the standard error, which randomised sequences allow
-and which a variance over their (dependent) samples would overstate. Before the first sample, a pilot
-teaches a guide (`guide.py`) and decides whether multiple importance sampling pays in this view.
+and which a variance over their (dependent) samples would overstate. Before the first sample, a
+pilot teaches a guide (`guide.py`) and decides whether multiple importance sampling pays here.
 """
 
 from __future__ import annotations
@@ -119,7 +119,9 @@ class Accumulator:
     def _indirect(self, spp: int, seed: int, first: int) -> NDArray[np.float64]:
         """Guided samples, of which the guide takes note: that costs nothing measurable."""
         bounces = self.settings.bounces
-        return self.tracer.indirect(spp, seed, first, bounces, self.mis, self.guide, bool(self.guide))
+        return self.tracer.indirect(
+            spp, seed, first, bounces, self.mis, self.guide, bool(self.guide)
+        )
 
     def enough(self, goal: Goal) -> bool:
         """Whether the error is small, or a bound on samples or time is reached."""

@@ -96,4 +96,3 @@ def _mesh(name: str, group: list[Surface]) -> Any:
     values["faces"] = faces.astype(np.uint32).ravel()
     values.update()
     return mesh
-

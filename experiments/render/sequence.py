@@ -111,9 +111,7 @@ def _with_mover(source: Source, matrix: Array, radius: float) -> Any:
     return build(world)
 
 
-def motion_vectors(
-    tracer: Tracer, step: Step, before: Step | None
-) -> NDArray[np.float64]:
+def motion_vectors(tracer: Tracer, step: Step, before: Step | None) -> NDArray[np.float64]:
     """Pixels `(H, W, 2)` from here to where each point was in the previous frame (x, y).
 
     Zero in the first frame. Where nothing is hit, the sky is taken to be far away.

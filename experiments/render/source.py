@@ -107,5 +107,3 @@ def _near(scene: Any, home: Camera) -> float:
     if not (depth > 0).any():
         raise ValueError("the scene's own camera sees nothing; give it another one")
     return float(np.median(depth[depth > 0])) / 4
-
-

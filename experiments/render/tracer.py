@@ -74,18 +74,14 @@ class Tracer:
     def _sums(
         self, estimate: Callable[[Any, Any], Any], spp: int, seed: int, first: int | None
     ) -> NDArray[np.float64]:
-        """Sums `(H, W, 3)` of `spp` samples; from sample `first` of a sequence where it is given."""
+        """Sums `(H, W, 3)` of `spp` samples; from sample `first` of a sequence if it is given."""
         lane = dr.arange(mi.UInt32, self.width * self.height)
         seed, count = dr.opaque(mi.UInt32, seed), dr.opaque(mi.UInt32, spp)
         begin = dr.opaque(mi.UInt32, first or 0)
         generator = Independent.start(lane, seed)
 
         def body(i: Any, generator: Any, total: Any) -> tuple[Any, Any, Any]:
-            points = (
-                Independent(generator)
-                if first is None
-                else Stratified(lane, seed, begin + i)
-            )
+            points = Independent(generator) if first is None else Stratified(lane, seed, begin + i)
             total = total + estimate(points, mi.Bool(self.active))
             return i + 1, generator if first is not None else points.generator, total
 

@@ -30,7 +30,7 @@ class Lights:
 
 @dataclass(frozen=True)
 class Vertex:
-    """A point of a path: `it` spawns rays, `normal` is the shading normal facing the last vertex."""
+    """A point of a path: `it` spawns rays, the shading `normal` faces the last vertex."""
 
     it: Any
     normal: Any
@@ -48,18 +48,18 @@ def vertex_of(si: Any, direction: Any) -> Vertex:
     return Vertex(mi.Interaction3f(si.t, si.time, si.wavelengths, si.p, si.n), facing)
 
 
-def _balance(a: Any, b: Any) -> Any:
+def _power(a: Any, b: Any) -> Any:
     """The power heuristic of two densities, 0 where both are 0."""
     return dr.select(a > 0, a * a / (a * a + b * b), 0)
 
 
 def light_sample(scene: Any, vertex: Vertex, point: Any, mis: bool, active: Any) -> Any:
-    """Next-event estimation: mean radiance over the cosine-weighted hemisphere, one light sample."""
+    """Next-event estimation: mean radiance of the cosine-weighted hemisphere, one light sample."""
     ds, weight = scene.sample_emitter_direction(vertex.it, point, False, active)
     density = dr.maximum(dr.dot(vertex.normal, ds.d), 0) * dr.inv_pi
     active = active & (density > 0) & (ds.pdf > 0) & (dr.max(weight) > 0)
     active &= ~scene.ray_test(vertex.it.spawn_ray_to(ds.p), False, active)
-    share = dr.select(ds.delta, 1, _balance(ds.pdf, density)) if mis else mi.Float(1)
+    share = dr.select(ds.delta, 1, _power(ds.pdf, density)) if mis else mi.Float(1)
     return dr.select(active, weight * density * share, 0)
 
 
@@ -67,7 +67,7 @@ def _light_share(scene: Any, vertex: Vertex, ray: Any, si: Any, active: Any) -> 
     """The weight of a light hit by a cosine-distributed ray, against `light_sample`."""
     ds = mi.DirectionSample3f(scene, si, vertex.it)
     density = dr.maximum(dr.dot(vertex.normal, ray.d), 0) * dr.inv_pi
-    return _balance(density, scene.pdf_emitter_direction(vertex.it, ds, active))
+    return _power(density, scene.pdf_emitter_direction(vertex.it, ds, active))
 
 
 def light_met(scene: Any, vertex: Vertex, ray: Any, si: Any, active: Any) -> Any:

@@ -33,13 +33,11 @@ def forms(seed: int) -> World:
         mesh = FORMS[int(rng.integers(len(FORMS)))](rng).turned(np.eye(3) * size)
         low = mesh.vertices[:, 1].min()
         world.add(mesh.moved(spot - [0, low, 0]), palette.fabric(rng))
-        world.sights.append(spot + [0, size, 0])
+        world.sights.append(np.add(spot, [0, size, 0]))
     _panels(rng, world)
     for _ in range(16):
         angle, reach = rng.uniform(-1.0, 1.0), rng.uniform(2.6, 3.8)
-        world.lookouts.append(
-            [reach * np.sin(angle), rng.uniform(0.4, 2.5), reach * np.cos(angle)]
-        )
+        world.lookouts.append([reach * np.sin(angle), rng.uniform(0.4, 2.5), reach * np.cos(angle)])
     return world
 
 
@@ -111,7 +109,8 @@ def _bowl(rng: np.random.Generator) -> Mesh:
 
 
 def _superellipsoid(rng: np.random.Generator) -> Mesh:
-    return furniture.pillow(*rng.uniform(0.8, 1.6, 3), rng.uniform(0.3, 1.8))
+    width, height, depth = rng.uniform(0.8, 1.6, 3)
+    return furniture.pillow(width, height, depth, rng.uniform(0.3, 1.8))
 
 
 FORMS = (_knot, _torus, _blob, _turned, _ribbon, _bowl, _superellipsoid)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -64,7 +66,9 @@ def chair(rng: np.random.Generator) -> Items:
         bars = np.linspace(-half + 0.02, half - 0.02, 5)
         frame += [box([x - 0.012, seat, -half], [x + 0.012, top, -half + 0.024]) for x in bars]
         frame.append(box([-half, top - 0.06, -half], [half, top, -half + 0.03]))
-    cushion = box([-half + 0.02, seat + 0.04, -half + 0.03], [half - 0.02, seat + 0.07, half - 0.02])
+    cushion = box(
+        [-half + 0.02, seat + 0.04, -half + 0.03], [half - 0.02, seat + 0.07, half - 0.02]
+    )
     return [(join(frame), material), (cushion, palette.fabric(rng))]
 
 
@@ -107,7 +111,7 @@ def shelf(rng: np.random.Generator, width: float, height: float, depth: float = 
     frame += [box([-half, y - t, 0], [half, y, depth]) for y in levels]
     frame.append(box([-half, 0, -0.01], [half, height, 0.005]))
     items: Items = [(join(frame), material)]
-    for low, high in zip(levels[:-1], levels[1:], strict=True):
+    for low, high in pairwise(levels):
         items += clutter_row(rng, -half + 0.04, half - 0.04, low, high - low - 0.04, depth)
     return items
 
@@ -142,8 +146,9 @@ def books(
     while x < right - 0.02:
         t, h = rng.uniform(0.015, 0.05), room * rng.uniform(0.6, 0.98)
         front = depth * rng.uniform(0.7, 0.95)
-        items.append((box([x, y, 0.03], [min(x + t, right), y + h, front]),
-                      plain(palette.any_colour(rng))))
+        items.append(
+            (box([x, y, 0.03], [min(x + t, right), y + h, front]), plain(palette.any_colour(rng)))
+        )
         x += t + 0.002
     return items
 
@@ -160,8 +165,14 @@ def small_thing(rng: np.random.Generator, size: float) -> Items:
         w, d = size * rng.uniform(0.3, 0.5, 2)
         return [(box([-w, 0, -d], [w, size * rng.uniform(0.4, 1), d]), material)]
     if kind == 3:
-        profile = [(0.02, 0.0), (size * 0.2, 0.0), (size * 0.5, size * 0.4), (size * 0.46, size * 0.4),
-                   (size * 0.18, size * 0.05), (0.0, size * 0.05)]
+        profile = [
+            (0.02, 0.0),
+            (size * 0.2, 0.0),
+            (size * 0.5, size * 0.4),
+            (size * 0.46, size * 0.4),
+            (size * 0.18, size * 0.05),
+            (0.0, size * 0.05),
+        ]
         return [(lathe(profile), material)]
     items: Items = []
     for level in range(int(rng.integers(2, 5))):
@@ -189,8 +200,12 @@ def plant(rng: np.random.Generator, height: float) -> Items:
     centre = rng.normal(size=(count, 3)) * [0.16, 0.3, 0.16] * crown + [0, 0.3 + crown * 0.55, 0]
     centre[:, 1] = np.maximum(centre[:, 1], 0.28)
     items.append((leaves(rng, centre, rng.uniform(0.03, 0.09)), material))
-    items.append((tube([[0, 0.2, 0], [0.01, 0.5, 0], [0, height * 0.7, 0.01]], 0.015, 8),
-                  plain(palette.wood(rng))))
+    items.append(
+        (
+            tube([[0, 0.2, 0], [0.01, 0.5, 0], [0, height * 0.7, 0.01]], 0.015, 8),
+            plain(palette.wood(rng)),
+        )
+    )
     return items
 
 
@@ -219,8 +234,9 @@ def curtain(rng: np.random.Generator, width: float, height: float) -> Items:
     x = np.linspace(-width / 2, width / 2, 60)
     folds = rng.uniform(6, 12) * width
     z = 0.04 * np.sin(2 * np.pi * folds * x / max(width, 0.1) + rng.uniform(0, 6))
-    rows = np.stack([np.c_[x, np.full(60, y), z * (1.2 - 0.4 * y / height)]
-                     for y in np.linspace(0, height, 6)])
+    rows = np.stack(
+        [np.c_[x, np.full(60, y), z * (1.2 - 0.4 * y / height)] for y in np.linspace(0, height, 6)]
+    )
     return [(sheet(rows), palette.fabric(rng))]
 
 
@@ -237,10 +253,15 @@ def cabinet(rng: np.random.Generator, width: float, height: float, depth: float 
     body = box([-width / 2, 0.05, 0], [width / 2, height, depth])
     doors = int(max(1, round(width / 0.5)))
     edges = np.linspace(-width / 2, width / 2, doors + 1)
-    fronts = [box([a + 0.01, 0.08, depth], [b - 0.01, height - 0.03, depth + 0.02])
-              for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    fronts = [
+        box([a + 0.01, 0.08, depth], [b - 0.01, height - 0.03, depth + 0.02])
+        for a, b in pairwise(edges)
+    ]
     material = palette.timber(rng)
-    return [(body, material), (join(fronts), palette.timber(rng) if rng.random() < 0.3 else material)]
+    return [
+        (body, material),
+        (join(fronts), palette.timber(rng) if rng.random() < 0.3 else material),
+    ]
 
 
 def bed(rng: np.random.Generator, width: float) -> Items:
@@ -249,5 +270,8 @@ def bed(rng: np.random.Generator, width: float) -> Items:
     frame = join([box([-w, 0.05, -1.05], [w, 0.28, 1.05]), box([-w, 0, -1.1], [w, 1.0, -1.03])])
     mattress = pillow(width * 1.04, 0.3, 2.16, 0.25).moved([0, 0.38, 0])
     pillows = join([pillow(0.6, 0.16, 0.4, 0.6).moved([x, 0.56, -0.8]) for x in (-w / 2, w / 2)])
-    return [(frame, palette.timber(rng)), (mattress, palette.fabric(rng)),
-            (pillows, palette.fabric(rng))]
+    return [
+        (frame, palette.timber(rng)),
+        (mattress, palette.fabric(rng)),
+        (pillows, palette.fabric(rng)),
+    ]

@@ -21,11 +21,13 @@ def foliage(seed: int) -> World:
         world.add(box([-9, -0.5, -4.6], [9, high, -4.3]), palette.wall(rng))
     if rng.random() < 0.5:
         world.add(box([-5.0, -0.5, -9], [-4.7, 3, 9]), palette.wall(rng))
-    spots = [np.array([rng.uniform(-3.5, 3.5), 0, rng.uniform(-3.8, 1.2)])
-             for _ in range(int(rng.integers(5, 11)))]
+    spots = [
+        np.array([rng.uniform(-3.5, 3.5), 0, rng.uniform(-3.8, 1.2)])
+        for _ in range(int(rng.integers(5, 11)))
+    ]
     for spot in spots:
         (_tree if rng.random() < 0.35 else _bush)(rng, world, spot)
-        world.sights.append(spot + [0, rng.uniform(0.3, 1.6), 0])
+        world.sights.append(np.add(spot, [0, rng.uniform(0.3, 1.6), 0]))
     for _ in range(int(rng.integers(2, 8))):
         r = rng.uniform(0.1, 0.4)
         stone = sphere(r, 24).moved([rng.uniform(-3, 3), r * 0.4, rng.uniform(-3, 2.5)])
@@ -48,7 +50,9 @@ def _bush(rng: np.random.Generator, world: World, spot: Array) -> None:
     count, tall = int(rng.integers(400, 1600)), rng.uniform(0.5, 1.6)
     direction = rng.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    centres = direction * rng.uniform(0.5, 1, (count, 1)) ** 0.5 * [0.5 * tall, 0.5 * tall, 0.5 * tall]
+    centres = (
+        direction * rng.uniform(0.5, 1, (count, 1)) ** 0.5 * [0.5 * tall, 0.5 * tall, 0.5 * tall]
+    )
     centres = centres[centres[:, 1] > -0.5 * tall + 0.02] + spot + [0, tall * 0.5, 0]
     world.add(furniture.leaves(rng, centres, rng.uniform(0.03, 0.1)), plain(palette.leaf(rng)))
     if rng.random() < 0.4:
@@ -159,23 +163,23 @@ def cave(seed: int) -> World:
     y = np.maximum(r * np.sin(ga), -0.75 + 0.12 * rough)
     rock = sheet(np.stack([x, y, gz], -1))
     world.add(rock, palette.textured(rng, textures.earth, palette.stone(rng), rng.uniform(1, 3)))
-    world.add(box([bend[-1] - 5, -4, length], [bend[-1] + 5, 5, length + 0.2]), plain([0.3, 0.28, 0.25]))
+    world.add(
+        box([bend[-1] - 5, -4, length], [bend[-1] + 5, 5, length + 0.2]), plain([0.3, 0.28, 0.25])
+    )
     strength = 10 ** rng.uniform(0, 1)
     sky_light = np.array([0.8, 0.95, 1.2]) if rng.random() < 0.6 else palette.lamplight(rng)
     mouth = quad([-3.2, -2.5, -0.6], [6.4, 0, 0], [0, 5.5, 0])
     world.shine(mouth, sky_light * strength)
     for _ in range(int(rng.integers(0, 3))):
         i = int(rng.integers(60, rows - 20))
-        place = [bend[i] + rng.uniform(-0.5, 0.5), -0.3, z[i]]
-        world.shine_ball(place, 0.14, palette.lamplight(rng) * strength * rng.uniform(3, 12))
+        spot = [bend[i] + rng.uniform(-0.5, 0.5), -0.3, z[i]]
+        world.shine_ball(spot, 0.14, palette.lamplight(rng) * strength * rng.uniform(3, 12))
     for _ in range(int(rng.integers(4, 12))):
         i = int(rng.integers(20, rows - 20))
         place = np.array([bend[i] + rng.uniform(-1, 1) * radius[i] * 0.8, -0.7, z[i]])
         world.add(_boulder(rng, rng.uniform(0.15, 0.45)).moved(place), plain(palette.stone(rng)))
         world.sights.append(place)
     for i in rng.integers(25, rows - 10, 20):
-        world.lookouts.append(
-            [bend[i] + rng.uniform(-0.5, 0.5), rng.uniform(-0.2, 0.6), z[i]]
-        )
+        world.lookouts.append([bend[i] + rng.uniform(-0.5, 0.5), rng.uniform(-0.2, 0.6), z[i]])
         world.sights.append([bend[int(i) // 2], rng.uniform(-0.3, 0.5), z[int(i) // 2]])
     return world

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from colorsys import hsv_to_rgb
 from collections.abc import Sequence
+from colorsys import hsv_to_rgb
 
 import numpy as np
 from numpy.typing import NDArray

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from experiments.scenes import furniture, palette, textures
@@ -18,7 +20,7 @@ from experiments.scenes.geometry import (
     sphere,
     tube,
 )
-from experiments.scenes.shell import Opening, daylight, pierced, shell, sides, window
+from experiments.scenes.shell import Opening, daylight, shell, sides, window
 from experiments.scenes.sky import sky
 from experiments.scenes.world import Material, World, plain
 
@@ -73,11 +75,14 @@ def _side_rooms(
     world.add(box([x, -0.2, -0.2], [far, 0, length + 0.2]), palette.floor(rng))
     world.add(box([x, height, -0.2], [far, height + 0.2, length + 0.2]), plain([0.7, 0.7, 0.7]))
     world.add(box([far, -0.2, -0.2], [far + 0.2, height + 0.2, length + 0.2]), material)
-    edges = [-0.1, *(length / 2 + (a.right + b.left) / 2 for a, b in zip(doors, doors[1:], strict=False)),
-             length]
+    edges = [
+        -0.1,
+        *(length / 2 + (a.right + b.left) / 2 for a, b in pairwise(doors)),
+        length,
+    ]
     for z in edges:
         world.add(box([x, 0, z - 0.05], [far, height, z + 0.05]), material)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         if rng.random() < 0.5:
             z0 = low + (high - low) * 0.2
             panel = quad([far - 0.02, 0.9, z0], [0, 0, (high - low) * 0.6], [0, height - 1.4, 0])
@@ -91,8 +96,11 @@ def _walk(rng: np.random.Generator, world: World, size: tuple[float, float, floa
     width, height, length = size
     for _ in range(16):
         world.lookouts.append(
-            [width * rng.uniform(0.25, 0.75), rng.uniform(1.0, min(1.9, height - 0.3)),
-             length * rng.uniform(0.35, 0.95)]
+            [
+                width * rng.uniform(0.25, 0.75),
+                rng.uniform(1.0, min(1.9, height - 0.3)),
+                length * rng.uniform(0.35, 0.95),
+            ]
         )
         world.sights.append(
             [width * rng.uniform(0.1, 1.2), rng.uniform(0.6, 1.5), length * rng.uniform(0, 0.5)]
@@ -139,9 +147,14 @@ def colonnade(seed: int) -> World:
         world.add(box([x, 0, -depth - 0.4], [x + 0.3, height, 0.1]), stone)
     world.add(box([-4, 0, 8], [length + 4, rng.uniform(2, 6), 8.5]), palette.wall(rng))
     for _ in range(int(rng.integers(2, 7))):
-        item = furniture.plant(rng, rng.uniform(1, 2)) if rng.random() < 0.5 else (
-            furniture.small_thing(rng, rng.uniform(0.4, 1.0)))
-        world.add_all(placed(item, [rng.uniform(0.5, length - 0.5), 0, rng.uniform(-depth + 0.5, 3)]))
+        item = (
+            furniture.plant(rng, rng.uniform(1, 2))
+            if rng.random() < 0.5
+            else (furniture.small_thing(rng, rng.uniform(0.4, 1.0)))
+        )
+        world.add_all(
+            placed(item, [rng.uniform(0.5, length - 0.5), 0, rng.uniform(-depth + 0.5, 3)])
+        )
     world.environment = sky(rng)
     for _ in range(16):
         inside = rng.random() < 0.65
@@ -169,9 +182,17 @@ def _column(
     """A turned column; all of one scene are alike."""
     same = np.random.default_rng([50, seed])
     r, material = same.uniform(0.14, 0.24), plain(palette.stone(same))
-    profile = [(r * 1.7, 0.0), (r * 1.7, 0.15), (r * 1.3, 0.18), (r * 1.1, 0.3),
-               (r, height * 0.5), (r * 0.85, height - 0.4), (r * 1.2, height - 0.3),
-               (r * 1.6, height - 0.12), (r * 1.6, height)]
+    profile = [
+        (r * 1.7, 0.0),
+        (r * 1.7, 0.15),
+        (r * 1.3, 0.18),
+        (r * 1.1, 0.3),
+        (r, height * 0.5),
+        (r * 0.85, height - 0.4),
+        (r * 1.2, height - 0.3),
+        (r * 1.6, height - 0.12),
+        (r * 1.6, height),
+    ]
     world.add(lathe(profile, 32).moved(foot), material)
     x, _, z = foot
     top = box([x - r * 1.8, height, z - r * 1.8], [x + r * 1.8, height + 0.15, z + r * 1.8])
@@ -190,8 +211,14 @@ def stairs(seed: int) -> World:
     hole = Opening(-width * 0.3, width * 0.3, mid + rng.uniform(0.6, 1.0), height - 0.5)
     walls = dict.fromkeys(("back", "front", "left", "right"), palette.wall(rng))
     walls["right"] = palette.wall(rng)
-    shell(world, (width, height, depth), walls, {"back": [hole]}, palette.floor(rng),
-          plain(palette.pale(rng)))
+    shell(
+        world,
+        (width, height, depth),
+        walls,
+        {"back": [hole]},
+        palette.floor(rng),
+        plain(palette.pale(rng)),
+    )
     back = sides(width, depth)["back"]
     back.put(world, window(rng, hole, 0.25))
     strength = 10 ** rng.uniform(0, 1)
@@ -208,7 +235,9 @@ def stairs(seed: int) -> World:
     world.add(box([0, mid - 0.18, 0], [width, mid, landing]), material)
     z0, z1 = landing + steps * tread, landing
     _railing(world, [flight - 0.05, 0, z0], [flight - 0.05, mid, z1], steps, rail)
-    _railing(world, [width - flight + 0.05, mid, z1], [width - flight + 0.05, 2 * mid, z0], steps, rail)
+    _railing(
+        world, [width - flight + 0.05, mid, z1], [width - flight + 0.05, 2 * mid, z0], steps, rail
+    )
     top = box([width - flight, 2 * mid - 0.18, z0], [width, 2 * mid, depth])
     world.add(top, material)
     for _ in range(16):
@@ -216,12 +245,19 @@ def stairs(seed: int) -> World:
         y = rng.uniform(1.2, 2.4) if low else 2 * mid + rng.uniform(0.8, 1.5)
         x = rng.uniform(0.3, width - 0.3) if low else rng.uniform(width - flight, width - 0.3)
         world.lookouts.append([x, y, rng.uniform(z0 + 0.3, depth - 0.2)])
-        world.sights.append([rng.uniform(0.2, width), rng.uniform(0.4, 1.6 * mid), rng.uniform(0.5, z0)])
+        world.sights.append(
+            [rng.uniform(0.2, width), rng.uniform(0.4, 1.6 * mid), rng.uniform(0.5, z0)]
+        )
     return world
 
 
 def _step(
-    world: World, x: tuple[float, float], y: float, rise: float, z: float, tread: float,
+    world: World,
+    x: tuple[float, float],
+    y: float,
+    rise: float,
+    z: float,
+    tread: float,
     material: Material,
 ) -> None:
     world.add(box([x[0], max(0.0, y - 0.12), z], [x[1], y + rise, z + tread + 0.02]), material)
@@ -251,8 +287,14 @@ def hall(seed: int) -> World:
         Opening(x - 0.9, x + 0.9, rng.uniform(0.5, 1.5), height - rng.uniform(0.5, 1.0))
         for x in np.linspace(-side.width / 2 + 1.5, side.width / 2 - 1.5, int(rng.integers(2, 4)))
     ]
-    shell(world, (width, height, depth), walls, {name: holes}, palette.floor(rng),
-          plain(palette.pale(rng)))
+    shell(
+        world,
+        (width, height, depth),
+        walls,
+        {name: holes},
+        palette.floor(rng),
+        plain(palette.pale(rng)),
+    )
     strength = 10 ** rng.uniform(0, 1)
     for hole in holes:
         side.put(world, window(rng, hole, 0.25))
@@ -264,7 +306,7 @@ def hall(seed: int) -> World:
     for _ in range(int(rng.integers(4, 12))):
         spot = np.array([rng.uniform(1, width - 1), 0, rng.uniform(1, depth - 1)])
         _lone_thing(rng, world, spot)
-        world.sights.append(spot + [0, 0.4, 0])
+        world.sights.append(np.add(spot, [0, 0.4, 0]))
     for _ in range(20):
         world.lookouts.append(
             [rng.uniform(0.6, width - 0.6), rng.uniform(0.7, 2.2), rng.uniform(0.6, depth - 0.6)]
@@ -276,7 +318,7 @@ def _lone_thing(rng: np.random.Generator, world: World, spot: np.ndarray) -> Non
     material, r = palette.fabric(rng), rng.uniform(0.25, 1.0)
     kind = int(rng.integers(5))
     if kind == 0:
-        world.add(sphere(r).moved(spot + [0, r, 0]), material)
+        world.add(sphere(r).moved(np.add(spot, [0, r, 0])), material)
     elif kind == 1:
         block = box([-r, 0, -r * 0.7], [r, r * rng.uniform(0.4, 2.2), r * 0.7])
         world.add(block.turned(rotation(rng.uniform(0, 90))).moved(spot), material)

@@ -49,7 +49,9 @@ def _furnish(world: World, rng: np.random.Generator) -> None:
     world.add(vase, plain([0.08, 0.2, 0.55]))
     world.add(box([1.95, 0.74, 1.85], [2.2, 0.79, 2.02]).moved([0, 0, 0]), plain([0.6, 0.08, 0.06]))
     world.add_all(put(furniture.chair(np.random.default_rng(11)), [2.55, 0, 2.45], 195))
-    weave = palette.textured(np.random.default_rng(3), textures.rug, np.array([0.4, 0.12, 0.08]), 2.4)
+    weave = palette.textured(
+        np.random.default_rng(3), textures.rug, np.array([0.4, 0.12, 0.08]), 2.4
+    )
     rug = quad([-1.2, 0.012, 0.85], [2.4, 0, 0], [0, 0, -1.7]).turned(rotation(6))
     world.add(rug.moved([2.0, 0, 2.2]), weave)
     world.add_all(put(furniture.shelf(np.random.default_rng(4), 1.1, 1.9), [3.75, 0, 0.0]))

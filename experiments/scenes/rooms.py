@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from experiments.scenes import furniture, palette
@@ -88,13 +90,13 @@ def shelves(seed: int) -> World:
         width = rng.uniform(0.7, 1.4)
         width = min(width, size[0] - 0.25 - x)
         depth = rng.uniform(0.25, 0.4)
-        world.add_all(
-            placed(furniture.shelf(rng, width, top, depth), [x + width / 2, 0, 0.01])
-        )
+        world.add_all(placed(furniture.shelf(rng, width, top, depth), [x + width / 2, 0, 0.01]))
         for _ in range(2):
             world.sights.append([x + rng.random() * width, rng.uniform(0.4, top), 0.2])
         x += width + rng.choice([0.03, 0.25])
-    world.add_all(placed(furniture.table(rng, 1.1, 0.6), [size[0] / 2, 0, 1.6], rng.uniform(-20, 20)))
+    world.add_all(
+        placed(furniture.table(rng, 1.1, 0.6), [size[0] / 2, 0, 1.6], rng.uniform(-20, 20))
+    )
     world.add_all(
         placed(
             furniture.clutter_row(rng, -0.45, 0.45, 0.74, 0.3, 0.35),
@@ -122,9 +124,13 @@ def _windows(rng: np.random.Generator, size: Size) -> dict[str, list[Opening]]:
         count = int(rng.integers(1, 3))
         slots = np.linspace(-widths[name] / 2, widths[name] / 2, count + 1)
         found[name] = [
-            Opening(a + (b - a) * rng.uniform(0.12, 0.3), b - (b - a) * rng.uniform(0.12, 0.3),
-                    low, high)
-            for a, b in zip(slots[:-1], slots[1:], strict=True)
+            Opening(
+                a + (b - a) * rng.uniform(0.12, 0.3),
+                b - (b - a) * rng.uniform(0.12, 0.3),
+                low,
+                high,
+            )
+            for a, b in pairwise(slots)
         ]
     return found
 
@@ -142,7 +148,9 @@ def _enclose(
     for name, side in sides(size[0], size[2]).items():
         if not any(hole.low < 0.12 for hole in openings.get(name, [])):
             half = side.width / 2
-            side.put(world, [(box([-half, 0, 0], [half, rng.uniform(0.07, 0.12), 0.015]), skirting)])
+            side.put(
+                world, [(box([-half, 0, 0], [half, rng.uniform(0.07, 0.12), 0.015]), skirting)]
+            )
 
 
 def _hang_curtains(
@@ -158,8 +166,10 @@ def _ceiling_panel(rng: np.random.Generator, world: World, size: Size, strength:
     x, z = size[0] / 2 - w / 2, size[2] / 2 - d / 2
     panel = quad([x, size[1] - 0.03, z], [w, 0, 0], [0, 0, d])
     world.shine(panel, palette.lamplight(rng) * strength)
-    world.add(box([x - 0.03, size[1] - 0.025, z - 0.03], [x + w + 0.03, size[1], z + d + 0.03]),
-              plain([0.6, 0.6, 0.6]))
+    world.add(
+        box([x - 0.03, size[1] - 0.025, z - 0.03], [x + w + 0.03, size[1], z + d + 0.03]),
+        plain([0.6, 0.6, 0.6]),
+    )
 
 
 def _furnish(rng: np.random.Generator, world: World, size: Size, windows: set[str]) -> None:
@@ -172,7 +182,7 @@ def _furnish(rng: np.random.Generator, world: World, size: Size, windows: set[st
         world.add_all(placed(rug, middle, turn))
     kind = (_dining, _living, _sleeping)[int(rng.integers(3))]
     world.add_all(placed(kind(rng), middle, turn))
-    world.sights += [middle + [0, 0.6, 0], middle + [0.4, 0.9, 0.3], middle + [-0.4, 0.3, 0.2]]
+    world.sights += list(middle + np.array([[0, 0.6, 0], [0.4, 0.9, 0.3], [-0.4, 0.3, 0.2]]))
     for name, side in sides(width, depth).items():
         _along_wall(rng, world, side, height, name in windows)
     for x, z in ((0.4, 0.4), (width - 0.4, 0.4), (width - 0.4, depth - 0.4)):
@@ -268,6 +278,8 @@ def _lamp(rng: np.random.Generator, world: World, size: Size) -> None:
 def _look_around(rng: np.random.Generator, world: World, size: Size) -> None:
     """Lookouts at eye height, mostly near the walls."""
     for _ in range(24):
-        x, z = (rng.choice([rng.uniform(0.3, 1.0), s - rng.uniform(0.3, 1.0), s * rng.random()])
-                for s in (size[0], size[2]))
+        x, z = (
+            rng.choice([rng.uniform(0.3, 1.0), s - rng.uniform(0.3, 1.0), s * rng.random()])
+            for s in (size[0], size[2])
+        )
         world.lookouts.append([x, rng.uniform(0.9, min(1.9, size[1] - 0.4)), z])

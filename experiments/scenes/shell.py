@@ -6,6 +6,7 @@ A wall is built in a frame of its own: x along the wall, its inner side at z = 0
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,8 +65,8 @@ def pierced(width: float, height: float, openings: list[Opening], thickness: flo
     xs = sorted({-width / 2, width / 2, *(e for o in openings for e in (o.left, o.right))})
     ys = sorted({0.0, height, *(e for o in openings for e in (o.low, o.high))})
     blocks = []
-    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
-        for y0, y1 in zip(ys[:-1], ys[1:], strict=True):
+    for x0, x1 in pairwise(xs):
+        for y0, y1 in pairwise(ys):
             x, y = (x0 + x1) / 2, (y0 + y1) / 2
             if not any(o.left < x < o.right and o.low < y < o.high for o in openings):
                 blocks.append(box([x0, y0, -thickness], [x1, y1, 0]))

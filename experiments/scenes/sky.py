@@ -22,10 +22,15 @@ def sky(
     picture = np.where(up > 0, zenith + (horizon - zenith) * (1 - np.clip(up, 0, 1)) ** 3, ground)
     if rng.random() < 0.7:
         height, around = np.radians(rng.uniform(15, 65)), rng.uniform(0, 2 * np.pi)
-        towards = np.array([np.cos(height) * np.cos(around), np.sin(height),
-                            np.cos(height) * np.sin(around)])
+        towards = np.array(
+            [np.cos(height) * np.cos(around), np.sin(height), np.cos(height) * np.sin(around)]
+        )
         direction = np.stack(
-            [np.sin(theta)[:, None] * np.cos(phi), up[..., 0], np.sin(theta)[:, None] * np.sin(phi)],
+            [
+                np.sin(theta)[:, None] * np.cos(phi),
+                up[..., 0],
+                np.sin(theta)[:, None] * np.sin(phi),
+            ],
             -1,
         )
         spread = np.radians(rng.uniform(*sun))

@@ -104,8 +104,9 @@ def rug(rng: np.random.Generator, colour: Array) -> Array:
     x, y = _coordinates()
     d = np.maximum(np.abs(x - 0.5), np.abs(y - 0.5)) * 2
     level = np.digitize(d, np.sort(rng.uniform(0.15, 0.97, 6)))
-    palette = np.clip(colour * rng.uniform(0.3, 1.6, (7, 1)) + rng.uniform(-0.1, 0.2, (7, 3)),
-                      0.02, 0.85)
+    palette = np.clip(
+        colour * rng.uniform(0.3, 1.6, (7, 1)) + rng.uniform(-0.1, 0.2, (7, 3)), 0.02, 0.85
+    )
     diamond = (np.abs(x * 8 % 1 - 0.5) + np.abs(y * 8 % 1 - 0.5) < 0.3) & (level % 2 == 0)
     picture = palette[level]
     picture[diamond] = palette[(level[diamond] + 1) % 7]

@@ -74,9 +74,7 @@ def test_a_reference_resumes_where_it_stopped(tracer: Tracer, tmp_path: Path) ->
     other = Accumulator.of(tracer, settings, 2, mask, state)
     assert other.spp == 0
     half = second.first_half()
-    np.testing.assert_allclose(
-        half, mask[..., None] * second.sums[:2].sum(0) / 64, rtol=1e-12
-    )
+    np.testing.assert_allclose(half, mask[..., None] * second.sums[:2].sum(0) / 64, rtol=1e-12)
 
 
 def test_the_stated_error_is_the_error(tracer: Tracer) -> None:

@@ -86,9 +86,7 @@ def _compare_indirect(
     Theirs is the relative one of the header, doubled: that is its median, and its tail is long.
     """
     stored = _blocks(_layer(channels, "reference", "RGB").mean(-1) * mask)
-    ours = [
-        _blocks(tracer.indirect(64, seed, 0).mean(-1) * mask / 64) for seed in (11, 12, 13, 14)
-    ]
+    ours = [_blocks(tracer.indirect(64, seed, 0).mean(-1) * mask / 64) for seed in (11, 12, 13, 14)]
     mean, spread = np.mean(ours, 0), np.std(ours, 0, ddof=1) / 2
     error = np.hypot(spread, 2 * relative * stored / 8) + 1e-9
     assert np.mean(np.abs(mean - stored) < 3 * error) > 0.97

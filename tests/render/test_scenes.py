@@ -56,7 +56,8 @@ def test_random_views_look_at_something_from_a_free_place(name: str) -> None:
 XML = """<scene version="3.0.0">
   <sensor type="perspective"><float name="fov" value="45"/>
     <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
-    <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="36"/></film>
+    <film type="hdrfilm"><integer name="width" value="64"/>
+      <integer name="height" value="36"/></film>
   </sensor>
   <bsdf type="roughconductor" id="metal">
     <rgb name="specular_reflectance" value="0.7 0.5 0.1"/></bsdf>
@@ -68,7 +69,8 @@ XML = """<scene version="3.0.0">
   <shape type="sphere" id="b"><point name="center" x="1" y="0" z="0"/>
     <float name="radius" value="0.6"/><ref id="coat"/></shape>
   <shape type="sphere" id="c"><float name="radius" value="0.3"/><ref id="pane"/></shape>
-  <shape type="sphere" id="d"><float name="radius" value="0.2"/><bsdf type="thindielectric"/></shape>
+  <shape type="sphere" id="d"><float name="radius" value="0.2"/>
+    <bsdf type="thindielectric"/></shape>
   <emitter type="constant"><rgb name="radiance" value="1 1 1"/></emitter>
 </scene>"""
 
@@ -89,7 +91,7 @@ def test_any_xml_becomes_lambertian_without_glass(tmp_path: Path) -> None:
 def test_a_broken_xml_is_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "broken.xml"
     path.write_text("<scene version='3.0.0'><shape type='sphere'>")
-    with pytest.raises(ValueError, match="Mitsuba cannot load .*broken.xml"):
+    with pytest.raises(ValueError, match="Mitsuba cannot load"):
         load_xml(path)
     path.write_text("<scene version='3.0.0'><shape type='sphere'/></scene>")
     with pytest.raises(ValueError, match="has no camera"):

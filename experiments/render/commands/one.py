@@ -124,5 +124,3 @@ def _say(path: Path, facts: dict[str, Any]) -> None:
     speed = facts["reference_samples_per_second"] / 1e6
     spp = facts["reference_spp"]
     print(f"{path}: reference {spp} spp, error {error:.3f}, {speed:.2f} million samples/s")
-
-

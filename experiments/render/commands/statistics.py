@@ -18,7 +18,6 @@ from experiments.scenes.catalogue import FAMILIES
 Found = dict[str, list[dict[str, float]]]
 
 
-
 def run(arguments: argparse.Namespace) -> None:
     """Print the statistics of the frames in `--folder` and of `shared/data`; draw them."""
     ours = _measure(sorted((arguments.folder / "train").glob("*.exr")))
