@@ -59,10 +59,12 @@ class Context:
         defines: dict[str, int],
         size: Sequence[int],
         arguments: Sequence[Any],
+        moved: int | None = None,
     ) -> None:
         """Enqueue kernel `name` of kernels_cl/`file`; `size` is padded to whole work-groups.
 
-        arguments: ints and floats are passed as int and float, arrays as their buffers.
+        arguments: ints and floats are passed as int and float, arrays as their buffers. moved: the
+        bytes that must be read and written, for the profile; by default those of all arrays.
         """
         local = (self.work_group, *(1 for _ in size[1:]))
         padded = tuple(math.ceil(n / m) * m for n, m in zip(size, local, strict=True))
@@ -71,7 +73,8 @@ class Context:
         )
         if self.launches is not None:
             arrays = {id(a): a.nbytes for a in arguments if hasattr(a, "nbytes")}
-            self.launches.append(Launch(name, event, sum(arrays.values())))
+            moved = sum(arrays.values()) if moved is None else moved
+            self.launches.append(Launch(name, event, moved))
 
     def empty(self, shape: Sequence[int], dtype: Any = np.float32) -> Any:
         """An uninitialised device array, from memory that earlier frames have given back."""

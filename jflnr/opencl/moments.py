@@ -46,7 +46,8 @@ def centre(context: Context, guides: tuple[Any, ...], weight: Any | None = None)
     rows = -(-height // step_y)
     partial = context.empty((rows, count, 2))
     arguments = (width, rows, step_x, step_y, *guide_arguments(guides), weight, partial)
-    context.run("centre_rows", "moments.cl", defines, (rows,), arguments)
+    sampled = sum(layer.nbytes for layer in guides) // (step_x * step_y)
+    context.run("centre_rows", "moments.cl", defines, (rows,), arguments, sampled)
     context.run("centre", "moments.cl", defines, (count,), (rows, partial, shift))
     return shift
 
