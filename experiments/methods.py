@@ -61,7 +61,8 @@ def ours() -> list[Method]:
     """`jflnr.denoise`, every method on every backend that is there."""
     found = []
     for backend in backends():
-        for method in jflnr.METHODS:
+        # The kernels are those of plain FLR.
+        for method in jflnr.METHODS if backend == "jax" else ("flr",):
             name = method if backend == "jax" else f"{method} ({backend})"
             parameters = {"method": method, "backend": backend}
             found.append(Method(name, "jflnr", jflnr.denoise, parameters, backend == "jax"))
