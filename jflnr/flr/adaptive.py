@@ -23,7 +23,7 @@ from jflnr.flr.moments import Guides, centre, collect, index_xy
 from jflnr.flr.pyramid import double, halve
 from jflnr.flr.weighted_moments import collect_weighted
 
-BLOCK = 4
+BLOCK = 8
 LEVELS = 4
 
 
@@ -43,8 +43,8 @@ def flr_adaptive(
     channels denoised together as light groups (C = 3, 6, ...) sum to the denoised sum.
 
     target: `(H, W, C)`, the noisy radiance Y, not negative. guides: `(H, W, Q)`, X without the
-    constant, or several such arrays. parameters: the fitted constants. block: side of the finest
-    blocks, in pixels. levels: number of grids, each twice as coarse. weight: `(H, W)`, numbers or a
+    constant, or several such arrays. parameters: the fitted constants. block: side in pixels of
+    the blocks of the pilot; the finest models have half of it. levels: number of grids, each twice as coarse. weight: `(H, W)`, numbers or a
     boolean mask; 0 removes a pixel, as does any value that is not finite. keep_energy: give every
     frame exactly the mean brightness of its input, instead of nearly.
     Returns `(H, W, C)`.
@@ -57,6 +57,7 @@ def flr_adaptive(
     shift = centre(guides)
     light = jnp.einsum("hwc,c->hw", target, brightness(target.shape[-1], target.dtype))
 
+    block = max(block // 2, 1)
     moments = collect(light[..., None], guides, shift, 2 * block, weight)
     mean = _frame_mean(moments, shift.size)
     weights, squares = _weights(light, guides, shift, moments, mean, weight, numbers, block)
@@ -87,7 +88,7 @@ def _weights(
 
     The variance of a pixel grows with its brightness, and the best weight is one over it.
     light: `(H, W)`. moments: of `light`, on blocks twice as large as `block`.
-    Returns the weights `(H, W)`, 0 where a pixel cannot be used, and the squared weighted residuals.
+    Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
     """
     grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
     features = _guide_features(grid, shift.size, numbers)
