@@ -44,9 +44,10 @@ def flr_adaptive(
 
     target: `(H, W, C)`, the noisy radiance Y, not negative. guides: `(H, W, Q)`, X without the
     constant, or several such arrays. parameters: the fitted constants. block: side in pixels of
-    the blocks of the pilot; the finest models have half of it. levels: number of grids, each twice as coarse. weight: `(H, W)`, numbers or a
-    boolean mask; 0 removes a pixel, as does any value that is not finite. keep_energy: give every
-    frame exactly the mean brightness of its input, instead of nearly.
+    the blocks of pass 1; the finest models have half of it. levels: number of grids, each twice as
+    coarse. weight: `(H, W)`, numbers or a boolean mask; 0 removes a pixel, as does any value that
+    is not finite. keep_energy: give every frame exactly the mean brightness of its input, instead
+    of nearly.
     Returns `(H, W, C)`.
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
