@@ -99,6 +99,8 @@ class Accumulator:
     def prepare(self) -> None:
         """Teach the guide, then keep or drop multiple importance sampling, whichever is better."""
         self.guide, self.mis = self.tracer.guide(), self.settings.mis
+        if self.guide is None:  # scalar variant: a pilot would cost more than it saves
+            return
         for i, spp in enumerate((16, 32)):
             seed = stream_seed(self.seed, "pilot", i)
             self._indirect(spp, seed, 0)

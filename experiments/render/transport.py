@@ -50,7 +50,7 @@ def vertex_of(si: Any, direction: Any) -> Vertex:
 
 def _power(a: Any, b: Any) -> Any:
     """The power heuristic of two densities, 0 where both are 0."""
-    return dr.select(a > 0, a * a / (a * a + b * b), 0)
+    return a * a / dr.maximum(a * a + b * b, 1e-30)
 
 
 def light_sample(scene: Any, vertex: Vertex, point: Any, mis: bool, active: Any) -> Any:
@@ -58,7 +58,7 @@ def light_sample(scene: Any, vertex: Vertex, point: Any, mis: bool, active: Any)
     ds, weight = scene.sample_emitter_direction(vertex.it, point, False, active)
     density = dr.maximum(dr.dot(vertex.normal, ds.d), 0) * dr.inv_pi
     active = active & (density > 0) & (ds.pdf > 0) & (dr.max(weight) > 0)
-    active &= ~scene.ray_test(vertex.it.spawn_ray_to(ds.p), False, active)
+    active &= scene.ray_test(vertex.it.spawn_ray_to(ds.p), False, active) ^ True
     share = dr.select(ds.delta, 1, _power(ds.pdf, density)) if mis else mi.Float(1)
     return dr.select(active, weight * density * share, 0)
 
@@ -73,6 +73,8 @@ def _light_share(scene: Any, vertex: Vertex, ray: Any, si: Any, active: Any) -> 
 def light_met(scene: Any, vertex: Vertex, ray: Any, si: Any, active: Any) -> Any:
     """Radiance of a light that a cosine-distributed ray met, weighted against `light_sample`."""
     emitter = si.emitter(scene, active)
+    if emitter is None:  # only in the scalar variant, which has one lane
+        return mi.Color3f(0)
     active = active & (emitter != None)  # noqa: E711 (a comparison of every lane)
     radiance = emitter.eval(si, active)
     share = _light_share(scene, vertex, ray, si, active)
@@ -82,21 +84,25 @@ def light_met(scene: Any, vertex: Vertex, ray: Any, si: Any, active: Any) -> Any
 def light_at_end(scene: Any, lights: Lights, vertex: Vertex, ray: Any, active: Any) -> Any:
     """`light_met` for a ray of which nothing else is needed: the fewest interactions."""
     if not lights.surfaces:
-        active = active & ~scene.ray_test(ray, False, active)
+        active = active & (scene.ray_test(ray, False, active) ^ True)
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.wi = -ray.d
         return light_met(scene, vertex, ray, si, active)
     hit = scene.ray_intersect_preliminary(ray, False, active=active)
     found = hit.is_valid()
-    useful = active & found & hit.shape.is_emitter()
+    useful = active & found
+    if hit.shape is not None:  # None only in the scalar variant
+        useful &= hit.shape.is_emitter()
     if lights.environment:
-        useful |= active & ~found
+        useful |= active & (found ^ True)
     si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, useful)
     return light_met(scene, vertex, ray, si, useful)
 
 
 def albedo_of(si: Any, active: Any) -> Any:
     """Diffuse reflectance (Color3f) at a hit, 0 to 1."""
+    if si.shape is None:  # only in the scalar variant
+        return mi.Color3f(0)
     return dr.clip(si.bsdf().eval_diffuse_reflectance(si, active), 0, 1)
 
 
@@ -158,4 +164,5 @@ def open_sky(scene: Any, start: Vertex, points: Any, distance: Any, active: Any)
     """One sample of ambient occlusion: 1 where a cosine ray is free within `distance`."""
     ray = start.cosine_ray(points.next_2d())
     ray.maxt = mi.Float(distance)
-    return mi.Color3f(dr.select(active & ~scene.ray_test(ray, False, active), 1.0, 0.0))
+    free = active & (scene.ray_test(ray, False, active) ^ True)
+    return mi.Color3f(dr.select(free, mi.Float(1), 0))

@@ -50,6 +50,8 @@ def _table(name: str, tracer: Tracer, spp: int) -> None:
 
 def _ways(tracer: Tracer) -> list[tuple[str, Sums]]:
     guide = tracer.guide()
+    if guide is None:
+        raise ValueError("the scalar variant has no guides to compare: it needs libLLVM or a GPU")
     for seed, count in ((90, 16), (91, 32)):
         tracer.indirect(count, seed, 0, guide=guide, learning=True)
         guide.learn()
