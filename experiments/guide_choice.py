@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 import jflnr
@@ -12,6 +14,9 @@ from experiments import data, plots, results, resume
 from experiments.methods import Method
 from experiments.timing import times
 from experiments.tune import mean_psnr
+from jflnr.flr.parameters import DEFAULT
+from jflnr.flr.regression import flr
+from jflnr.frame import Array, Frame
 from jflnr.guides import NAMES
 
 NAME = "guide_choice"
@@ -29,8 +34,8 @@ def run(quick: bool) -> dict[str, Any]:
     def score(key: str) -> dict[str, float]:
         names = [name for name in key.split("+") if name]
         return {
-            "val": mean_psnr(choice, jflnr.denoise, {"guides": names}),
-            "test": mean_psnr(test, jflnr.denoise, {"guides": names}),
+            "val": mean_psnr(choice, guided_by, {"guides": names}),
+            "test": mean_psnr(test, guided_by, {"guides": names}),
         }
 
     chosen: list[str] = []
@@ -52,6 +57,15 @@ def run(quick: bool) -> dict[str, Any]:
     for step in steps[1:]:
         step |= clock[step["guides"]]
     return {"steps": steps, "tried": tried}
+
+
+def guided_by(frame: Frame, *, guides: Sequence[str]) -> Array:
+    """FLR with these guides; without any it is the Gaussian blur of the light."""
+    if guides:
+        return jflnr.denoise(frame, guides=guides)
+    light = jnp.asarray(frame.indirect)
+    weight = None if frame.mask is None else jnp.asarray(frame.mask)[..., 0]
+    return flr(light, light[..., :0], DEFAULT, weight=weight)
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:

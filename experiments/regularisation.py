@@ -102,7 +102,7 @@ def draw(result: dict[str, Any], folder: Path) -> None:
         axes[0].get_figure().colorbar(shown, ax=axes[0], label="PSNR, dB")
         axes[0].plot(learned["eps_prime"], learned["eps"], "*", ms=14, c="white", mec="black")
         axes[0].set(xscale="log", yscale="log", xlabel="eps' (additive)", ylabel="eps")
-        axes[0].set_title("normalised, Eq. 18-23 (star: learned)", fontsize=10)
+        axes[0].set_title("normalised, Eq. 18-23 (star: the defaults, learned)", fontsize=9)
         axes[0].grid(False)
         best = grid[..., 0].max(axis=0)
         axes[1].semilogx(values, best, "o-", label="normalised, against eps' (best eps)")
