@@ -39,7 +39,8 @@ def load_xml(path: Path, ball: Ball | None = None) -> tuple[Any, Camera]:
         make_lambertian(root)
         if ball:
             root.append(_ball(*ball))
-        mi.file_resolver().prepend(str(path.resolve().parent))
+        resolver: Any = mi.file_resolver
+        resolver().prepend(str(path.resolve().parent))
         scene = _load(ElementTree.tostring(root, "unicode"))
     except (ElementTree.ParseError, RuntimeError) as error:
         raise ValueError(

@@ -75,7 +75,8 @@ class Independent:
     def start(lane: Any, seed: Any) -> Any:
         """The PCG32 of every lane, unrelated between lanes and between seeds."""
         state, sequence = mi.sample_tea_32(seed, lane)
-        return mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
+        generator: Any = mi.PCG32
+        return generator(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
 
     def next_2d(self) -> mi.Point2f:
         return mi.Point2f(self.generator.next_float32(), self.generator.next_float32())

@@ -38,6 +38,7 @@ class Tracer:
     @classmethod
     def of(cls, scene: Any, camera: Camera, width: int, height: int) -> Tracer:
         """Trace the primary rays, through the pixel centres."""
+        start: Any
         if dr.is_jit_v(mi.Float):
             lanes = dr.arange(mi.UInt32, width * height)
             start, hit, shape, layers = _primary(scene, camera, width, height, lanes)
