@@ -9,9 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
+from jflnr.flr.elimination import solve_strips
 from jflnr.flr.moments import index_xx, index_xy
-from jflnr.flr.parameters import Parameters
-from jflnr.flr.solve import solve
 from jflnr.flr.window import Window, gather, gather_moments, window_over
 
 
@@ -96,7 +95,7 @@ def fit_level(
     # Positions are centred on the window already, so only their own ridge is added.
     for i in (guides + 1, guides + 2):
         moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
-    local = Parameters(0.0, jnp.log(numbers.eps + ridge), jnp.log(numbers.eps_prime + ridge))
     centred = jnp.concatenate([shift, jnp.zeros(2, shift.dtype)])
-    coefficients = solve(moments, centred, local, channels)
+    regular = numbers.eps + ridge, numbers.eps_prime + ridge
+    coefficients = solve_strips(moments, centred, *regular, channels)
     return Fit(coefficients[: guides + 1], variance, window)

@@ -1,0 +1,85 @@
+"""The regularised least squares of `solve.py` for many blocks: strip by strip, by elimination.
+
+The same equations (Appendix, Eq. 12-23) with regularisation that differs from block to block. A few
+rows of blocks at a time stay in the cache, and Gauss-Jordan elimination is one short loop, which
+compiles in a fraction of the time that a factorisation written out takes.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from jflnr.flr.moments import index_xx, index_xy
+
+# Blocks that are solved at a time.
+STRIP = 4096
+
+
+def solve_strips(
+    moments: jax.Array, shift: jax.Array, eps: jax.Array, eps_prime: jax.Array, channels: int
+) -> jax.Array:
+    """Coefficients of the local affine models, as from `solve`.
+
+    moments: `(K, h, w)`. shift: `(Q,)`. eps, eps_prime: `(h, w)`, multiplicative and additive
+    regularisation. channels: the number C of target channels. Returns `(Q + 1, C, h, w)`.
+    """
+    height, width = moments.shape[1:]
+    rows = min(max(STRIP // width, 1), height)
+    planes = jnp.concatenate([moments, eps[None], eps_prime[None]])
+    planes = jnp.pad(planes, ((0, 0), (0, -height % rows), (0, 0)))
+    strips = jnp.moveaxis(planes.reshape(planes.shape[0], -1, rows, width), 1, 0)
+    models = lax.map(lambda strip: _solve(strip, shift, channels), strips)
+    models = jnp.moveaxis(models, 0, 2)
+    return models.reshape(*models.shape[:2], -1, width)[:, :, :height]
+
+
+def _solve(planes: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
+    count = shift.size
+    moments, eps, eps_prime = planes[:-2], planes[-2], planes[-1]
+    filled = moments[0] > 1e-12
+    means = moments * jnp.where(filled, 1 / jnp.where(filled, moments[0], 1), 0)
+    xx = (count + 1) * (count + 2) // 2
+    mean_x = means[np.array([index_xx(i + 1, 0) for i in range(count)], int)]
+    mean_y = means[index_xy(0, 0, count, channels) :][:channels]
+    if not count:
+        return mean_y[None]
+    pairs = np.array([[index_xx(i + 1, j + 1) for j in range(count)] for i in range(count)])
+    diagonal = jnp.eye(count, dtype=bool)[:, :, None, None]
+    covariance = means[pairs] - mean_x[:, None] * mean_x
+    covariance = jnp.where(diagonal, jnp.maximum(covariance, 0), covariance)
+    mu = mean_x + shift[:, None, None].astype(means.dtype)
+    outer = eps * mu[:, None] * mu
+    regular = covariance + outer + jnp.where(diagonal, outer + eps_prime, 0)
+
+    scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)]))
+    correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)
+    cross = means[xx + channels :].reshape(count, channels, *means.shape[1:])
+    right = (cross - mean_x[:, None] * mean_y) * scale[:, None]
+    slopes = _eliminate(jnp.concatenate([correlation, right], axis=1)) * scale[:, None]
+    value = mean_y - jnp.sum(mean_x[:, None] * slopes, axis=0)
+    return jnp.concatenate([value[None], slopes])
+
+
+def _eliminate(system: jax.Array) -> jax.Array:
+    """Gauss-Jordan on `(Q, Q + C, ...)`, symmetric with a diagonal near 1; `(Q, C, ...)`.
+
+    A pivot no larger than the rounding error belongs to a guide that others already explain: its
+    slope is 0.
+    """
+    count = system.shape[0]
+
+    def step(k: jax.Array, system: jax.Array) -> jax.Array:
+        row = lax.dynamic_index_in_dim(system, k, 0, keepdims=False)
+        column = lax.dynamic_index_in_dim(system, k, 1, keepdims=False)
+        pivot = lax.dynamic_index_in_dim(row, k, 0, keepdims=False)
+        clear = pivot > 8 * jnp.finfo(pivot.dtype).eps
+        row = row * jnp.where(clear, 1 / jnp.where(clear, pivot, 1), 0)
+        is_row = (jnp.arange(count) == k).reshape(-1, *(1,) * pivot.ndim)
+        column = jnp.where(is_row, -1, column)
+        kept = jnp.where(is_row[:, None], 0, system)
+        return kept - column[:, None] * row
+
+    return lax.fori_loop(0, count, step, system)[:, count:]
