@@ -99,15 +99,15 @@ def fill(
     frames: int,
     say: Callable[[str], None] = print,
 ) -> int:
-    """Render jobs until `frames` frames are there; returns how many are. Finished ones stay.
+    """Render jobs until `frames` of their split are there; returns how many. Finished ones stay.
 
     Raises ValueError where a job's scene does not belong to the split it is to be written to.
     """
     manifest = Manifest(folder)
     source: Source | None = None
-    start, made = time.monotonic(), 0
-    there = manifest.count()
+    start, made, there = time.monotonic(), 0, 0
     for job in jobs:
+        there = manifest.count(job.split)
         if there >= frames:
             break
         check_split(job.scene, job.split)

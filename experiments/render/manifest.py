@@ -16,18 +16,19 @@ class Manifest:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / NAME
-        self.entries: dict[str, dict[str, Any]] = {}
-        if self.path.exists():
-            self.entries = json.loads(self.path.read_text())["frames"]
+        self.entries = self._read()
+
+    def _read(self) -> dict[str, dict[str, Any]]:
+        return json.loads(self.path.read_text())["frames"] if self.path.exists() else {}
 
     def done(self, name: str) -> bool:
         """Whether nothing is left to do for a frame: it is finished, or cannot be rendered."""
         entry = self.entries.get(name)
         return entry is not None and ("skipped" in entry or (self.path.parent / name).exists())
 
-    def count(self) -> int:
-        """Finished frames."""
-        return sum("skipped" not in entry for entry in self.entries.values())
+    def count(self, split: str) -> int:
+        """Finished frames of a split."""
+        return sum(entry.get("split") == split for entry in self.entries.values())
 
     def add(self, name: str, facts: dict[str, Any]) -> None:
         """Record a finished frame, with the SHA-256 of its file."""
@@ -39,7 +40,7 @@ class Manifest:
         self._set(name, {"skipped": reason})
 
     def _set(self, name: str, entry: dict[str, Any]) -> None:
-        self.entries[name] = entry
+        self.entries = self._read() | {name: entry}  # another process may have added some
         self.path.parent.mkdir(parents=True, exist_ok=True)
         beside = self.path.with_suffix(".tmp")
         beside.write_text(json.dumps({"frames": self.entries}, indent=1))

@@ -12,4 +12,4 @@ def run(arguments: argparse.Namespace) -> None:
     split = arguments.split
     jobs = training_jobs() if split == "train" else evaluation_jobs(split)
     there = fill(arguments.folder, jobs, arguments.frames, lambda line: print(line, flush=True))
-    print(f"{there} frames in {arguments.folder}")
+    print(f"{there} frames of the split {split} in {arguments.folder}")
