@@ -35,12 +35,12 @@ SEARCH: dict[str, tuple[Denoiser, Mapping[str, Any], dict[str, tuple[Any, ...]]]
     "a-trous": (
         atrous.denoise,
         atrous.TUNED,
-        {"colour": (64, 1e3, 1e5), "normal": (0.25, 0.5, 1.0), "position": (0.1, 0.3, 1.0)},
+        {"colour": (64, 1e3, 1e5), "normal": (0.25, 0.5, 1.0), "position": (0.05, 0.1, 0.3)},
     ),
     "SVGF, spatial": (
         svgf.denoise,
         svgf.TUNED,
-        {"sigma_l": (16, 64, 1e3), "sigma_n": (8, 32, 128), "sigma_z": (1.0, 4.0, 16.0)},
+        {"sigma_l": (16, 64, 1e3), "sigma_n": (4, 8, 32), "sigma_z": (1.0, 4.0, 16.0)},
     ),
     "BMFR, one frame": (
         bmfr.denoise,

@@ -16,7 +16,7 @@ from jflnr.guides import layers
 # The paper leaves the widths to the user. These are those of its listing's order of magnitude,
 # the colour's being halved at every level.
 PAPER: dict[str, Any] = {"levels": 5, "colour": 4.0, "normal": 0.5, "position": 0.3}
-TUNED: dict[str, Any] = {"levels": 5, "colour": 64.0, "normal": 0.5, "position": 0.3}
+TUNED: dict[str, Any] = {"levels": 5, "colour": 1e3, "normal": 0.5, "position": 0.1}
 
 SPLINE = np.outer(*[np.array([1, 4, 6, 4, 1], np.float32) / 16] * 2).ravel()
 

@@ -21,11 +21,7 @@ PAPER: dict[str, Any] = {
     "noise": 0.01,
     "grids": 1,
 }
-TUNED: dict[str, Any] = {
-    "features": ("normal", "position", "ao"),
-    "block": 64,
-    "noise": 0.1,
-    "grids": 4,
+TUNED: dict[str, Any] = {"features": ("normal", "position"), "block": 64, "noise": 0.1, "grids": 4}
 }
 
 

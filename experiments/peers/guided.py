@@ -20,8 +20,12 @@ from jflnr.guides import layers, shrink
 
 PAPER: dict[str, Any] = {"guides": ("normal", "depth"), "radius": 24, "eps": 0.01}
 FAST_PAPER: dict[str, Any] = PAPER | {"subsample": 4, "average": False}
-TUNED: dict[str, Any] = {"guides": ("normal", "depth", "ao"), "radius": 24, "eps": 0.01}
-FAST_TUNED: dict[str, Any] = TUNED | {"subsample": 4, "average": True}
+TUNED: dict[str, Any] = {"guides": ("normal", "depth"), "radius": 16, "eps": 0.01}
+FAST_TUNED: dict[str, Any] = TUNED | {
+    "guides": ("normal", "depth", "ao"),
+    "subsample": 4,
+    "average": True,
+}
 
 
 def denoise(

@@ -18,7 +18,7 @@ QUALITY = {
 
 # As the paper of FLNR ran it: on the picture, with albedo and normal taken as noisy.
 PAPER: dict[str, Any] = {"quality": "high", "clean": False, "modulated": True}
-TUNED: dict[str, Any] = {"quality": "high", "clean": False, "modulated": False}
+TUNED: dict[str, Any] = {"quality": "high", "clean": True, "modulated": False}
 FAST_TUNED: dict[str, Any] = {"quality": "fast", "clean": False, "modulated": False}
 
 

@@ -18,7 +18,7 @@ from experiments.peers.windows import luminance, over_offsets, square
 from jflnr.frame import Array, Frame
 
 PAPER: dict[str, Any] = {"levels": 5, "sigma_l": 4.0, "sigma_n": 128.0, "sigma_z": 1.0}
-TUNED: dict[str, Any] = {"levels": 5, "sigma_l": 16.0, "sigma_n": 32.0, "sigma_z": 1.0}
+TUNED: dict[str, Any] = {"levels": 5, "sigma_l": 1e3, "sigma_n": 4.0, "sigma_z": 4.0}
 
 GAUSS = np.outer(*[np.array([1, 2, 1], np.float32) / 4] * 2).ravel()
 
