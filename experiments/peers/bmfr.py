@@ -22,7 +22,6 @@ PAPER: dict[str, Any] = {
     "grids": 1,
 }
 TUNED: dict[str, Any] = {"features": ("normal", "position"), "block": 64, "noise": 0.1, "grids": 4}
-}
 
 
 def denoise(
