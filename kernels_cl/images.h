@@ -105,6 +105,15 @@ INLINE real read_guide(GUIDE_PARAMETERS, int q, long pixel, int first, int last)
     return guide_lanes(guides_4 + pixel * PART_4, PART_4, q - END_3, first, last);
 }
 
+// Asks a processor for values to come. Worth it where guides lie in several images: the rows of a
+// block are then more streams than it follows by itself. An address past the end does no harm.
+#if WIDTH > 1 && PART_1 > 0
+#define EXPECT(p, i) __builtin_prefetch((const void *)(size_t)((p) + (i)))
+#else
+#define EXPECT(p, i)
+#endif
+#define AHEAD 64  // pixels
+
 // A guide as the moments and the model take it: its distance from the shift, cut so that the sum
 // of squares stays a float.
 #define FARTHEST 1e17f

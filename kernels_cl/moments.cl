@@ -46,6 +46,10 @@ kernel void moments(
             real one, x[Q + 1], y_[C];
             if (x0 + WIDTH <= right) {
                 one = 1;
+                EXPECT(target, (pixel + AHEAD) * C);
+                EXPECT(guides_0, (pixel + AHEAD) * PART_0);
+                EXPECT(guides_1, (pixel + AHEAD) * PART_1);
+                EXPECT(guides_2, (pixel + AHEAD) * PART_2);
 #pragma unroll
                 for (int q = 0; q < Q; ++q) x[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, WIDTH - 1);
 #pragma unroll
