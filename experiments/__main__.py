@@ -14,6 +14,7 @@ NAMES = (
     "gain",
     "speed",
     "ablation",
+    "stability",
     "tune",
     "table1",
     "pareto",

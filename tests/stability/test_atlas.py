@@ -1,0 +1,94 @@
+"""The bar of the atlas on every case: finite, in range, near the exact answer; gradients finite."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from experiments.stability import SIZE
+from experiments.stability.cases import CASES, make
+from experiments.stability.measures import measure, passes
+from experiments.stability.methods import EXACT, METHODS
+from jflnr.flr.parameters import DEFAULT
+from jflnr.flr.regression import flr
+
+MANY = "16 guides, rank 5"
+
+
+@functools.cache
+def exact(name, storage):
+    """A case and the float64 answer to its regularised problem."""
+    case = make(name, *SIZE, storage)
+    with np.errstate(all="ignore"):
+        return case, EXACT(case, np.float64)
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize(
+    ("method", "storage", "case"),
+    [
+        # Sixteen guides take as long to compile as all the rest, so once is enough.
+        *(("ours, Cholesky", np.float32, case) for case in CASES),
+        *(("ours, Cholesky", np.float16, case) for case in CASES if case != MANY),
+        *(("ours, OpenCL", np.float32, case) for case in CASES),
+        *(("ours, OpenCL", np.float16, case) for case in CASES),
+    ],
+)
+def test_ours_clears_the_bar(method, storage, case):
+    if method == "ours, OpenCL":
+        _needs_a_device()
+    made, truth = exact(case, storage)
+    result = METHODS[method](made, np.float32)
+    assert np.isfinite(result).all(), "also outside the mask"
+    figures = measure(made, result, truth, truth)
+    assert passes(figures), figures
+    # Far below the noise: the rounding of float32, grown by the condition that eps' allows.
+    assert figures["rounding"] < 1e-4
+
+
+def _needs_a_device():
+    from jflnr.opencl import NoDevice
+    from jflnr.opencl.context import default_context
+
+    try:
+        default_context()
+    except NoDevice as error:
+        pytest.skip(str(error))
+
+
+@functools.cache
+def _gradient():
+    def mean(target, guides, parameters, usable):
+        # A mean, not a sum of squares: that would itself overflow near the type's maximum.
+        light = flr(target, guides, parameters, support=96, weight=usable)
+        ramp = jnp.linspace(-1, 1, light.size).reshape(light.shape)
+        return jnp.sum(light / light.size * ramp)
+
+    return jax.jit(jax.grad(mean, argnums=(0, 1, 2)))
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("case", [case for case in CASES if case != MANY])
+def test_gradients_are_finite(case):
+    made, _ = exact(case, np.float32)
+    target, guides, usable = map(jnp.asarray, (made.target, made.guides, made.usable))
+    parameters = jax.tree.map(jnp.float32, DEFAULT)
+    for gradient in jax.tree.leaves(_gradient()(target, guides, parameters, usable)):
+        assert np.isfinite(gradient).all()
+
+
+def test_the_measures_notice_each_kind_of_failure():
+    case, truth = exact("ordinary", np.float32)
+    light = np.repeat(np.float64(case.target[..., 1:]), 2, -1)
+    assert passes(measure(case, truth, truth, truth))
+    assert measure(case, truth, truth, truth)["error"] == pytest.approx(1)
+    for spoil in (np.nan, np.inf, 1e3):
+        bad = truth.copy()
+        bad[3, 4, 0] = spoil
+        assert not passes(measure(case, bad, truth, truth))
+    offset = light + 0.5 * np.ptp(case.target[..., 0])
+    figures = measure(case, offset, truth, truth)
+    assert figures["bias"] == pytest.approx(0.5) and figures["bleeding"] > 0.5
+    assert not passes(figures)
