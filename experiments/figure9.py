@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ def run(quick: bool) -> dict[str, Any]:
     return {"size": SIZE, "crops": crops}
 
 
+@functools.lru_cache(maxsize=8)
 def images_of(path: Path) -> tuple[Frame, dict[str, np.ndarray]]:
     """The frame, and the displayed picture by each method, with the reference last."""
     frame = data.read(path)
