@@ -63,7 +63,7 @@ def rows_of(path: Path, spp: str, sigma: float) -> list[dict[str, Any]]:
     images["flr, sigma for this spp"] = np.asarray(flr_of_sigma(frame, sigma=sigma))
     if len(streams) == 2:
         a, b = ((data.read(path, n).indirect, n) for n in streams)
-        images["NFOR, tuned"] = np.asarray(nfor.denoise(frame, halves=(a, b), **nfor.TUNED))
+        images["NFOR"] = np.asarray(nfor.denoise(frame, halves=(a, b), **nfor.PAPER))
     return [
         {"method": name, "spp": int(spp), "frame": data.label(path)} | measure(frame, image)
         for name, image in images.items()

@@ -26,7 +26,6 @@ PAPER: dict[str, Any] = {
     "patch": 3,
     "bandwidths": (0.5, 1.0),
 }
-TUNED: dict[str, Any] = PAPER | {"bandwidths": (1.0, 2.0)}
 RIDGE = 1e-3
 
 
