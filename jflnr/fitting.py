@@ -90,7 +90,7 @@ def _example(frame: Frame, names: tuple[str, ...], block: int) -> Example:
         raise ValueError("frames: every frame needs a reference to be fitted to")
     layers = guide_layers.layers(frame, names)
     weight = None if frame.mask is None else jnp.asarray(frame.mask)[..., 0] > 0
-    shift = centre(layers)
+    shift = centre(layers, weight)
     return Example(
         moments=collect(jnp.asarray(frame.indirect), layers, shift, block, weight),
         shift=shift,
@@ -103,7 +103,8 @@ def _example(frame: Frame, names: tuple[str, ...], block: int) -> Example:
 @jax.jit
 def smape(picture: jax.Array, reference: jax.Array) -> jax.Array:
     """Mean of |x - y| / (|x| + |y|), differentiable where both are 0."""
-    floor = 1e-3 * jnp.mean(reference)
+    # Its square must not vanish where the reference is black, or the derivative there is 0/0.
+    floor = jnp.maximum(1e-3 * jnp.mean(reference), 1e-12)
     return jnp.mean(jnp.abs(picture - reference) / (jnp.abs(picture) + reference + floor))
 
 

@@ -140,7 +140,7 @@ def _half_masked(r: Room) -> Case:
 
 
 def _step_in_flat_region(r: Room) -> Case:
-    flat = r.guides * [1, 0, 0, 0, 0] + [0, 0, 1, 1, 1]
+    flat = np.where(np.arange(5) == 0, r.guides, np.array([0, 0, 1, 1, 1]))
     return r.case(flat, light=0.2 + r.guides[..., 0])
 
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from jflnr.flr.moments import Guides, into_strips, planes
+from jflnr.flr.moments import Guides, from_shift, into_strips, planes
 
 
 def apply(coefficients: jax.Array, guides: Guides, shift: jax.Array, block: int) -> jax.Array:
@@ -62,8 +62,8 @@ def _apply_strip(
     t = jnp.asarray((np.arange(block) - margin + 0.5) / block + 0.5, here.dtype)
 
     def into_cells(plane: jax.Array, shift: jax.Array) -> jax.Array:
-        guide = plane.astype(here.dtype) - shift
-        guide = jnp.where(jnp.isfinite(guide), guide, 0)
+        plane = plane.astype(here.dtype)
+        guide = jnp.where(jnp.isfinite(plane), from_shift(plane, shift), 0)
         padded = jnp.pad(guide, ((0, 0), (margin, cells * block - margin - width)))
         return padded.reshape(rows, cells, block)
 

@@ -36,7 +36,10 @@ def blur(moments: jax.Array, sigma: jax.Array, reach: int) -> jax.Array:
 
 def _convolve(planes: jax.Array, taps: jax.Array, axis: int) -> jax.Array:
     """Weighted sum of shifted copies: on a CPU 20 times faster than the general convolution."""
-    size, reach = planes.shape[axis], taps.size // 2
+    size = planes.shape[axis]
+    # What lies farther than the frame is wide is zero everywhere.
+    reach = min(taps.size // 2, size - 1)
+    taps = lax.slice_in_dim(taps, taps.size // 2 - reach, taps.size // 2 + reach + 1)
     margins = [(reach, reach) if a == axis else (0, 0) for a in range(planes.ndim)]
     padded = jnp.pad(planes, margins)
     shifted = (lax.slice_in_dim(padded, k, k + size, axis=axis) for k in range(taps.size))

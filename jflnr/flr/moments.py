@@ -11,11 +11,16 @@ from typing import TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 # One array `(H, W, Q)`, or several that make up the Q channels together, so that the layers of a
 # frame need not be copied into one.
 Guides: TypeAlias = jax.Array | tuple[jax.Array, ...]
+
+# Guides are cut to within this of their shift, so that sums of squares, regularised, do not
+# overflow in float32.
+FARTHEST = 1e16
 
 
 def index_xx(i: int, j: int) -> int:
@@ -39,25 +44,36 @@ def planes(image: Guides) -> list[jax.Array]:
     return [layer[..., q] for layer in jax.tree.leaves(image) for q in range(layer.shape[-1])]
 
 
-def centre(guides: Guides) -> jax.Array:
+def centre(guides: Guides, weight: jax.Array | None = None) -> jax.Array:
     """A typical value of each guide, from a sparse grid of pixels.
 
     Moments are collected about it, since in float32 the variance of a guide far from zero (a world
     position) would drown in the square of its mean. Any value gives the same regression.
 
-    guides: `(H, W, Q)`. Returns `(Q,)`.
+    guides: `(H, W, Q)`. weight: `(H, W)`, whose pixels of weight 0 (a sky said to be infinitely
+    far) do not count, or None. Returns `(Q,)`.
     """
-    values = [_sparse_mean(plane) for plane in planes(guides)]
+    counts = None if weight is None else _sparse(weight) > 0
+    values = [_sparse_mean(_sparse(plane), counts) for plane in planes(guides)]
     return lax.stop_gradient(jnp.stack(values) if values else jnp.zeros(0))
 
 
-def _sparse_mean(plane: jax.Array) -> jax.Array:
-    sample = plane[tuple(slice(None, None, max(size // 32, 1)) for size in plane.shape)]
-    sample = sample.astype(working_type(plane))
-    finite = jnp.isfinite(sample)
-    # Divided before it is summed: values near the type's maximum must not overflow.
-    count = jnp.maximum(jnp.sum(finite), 1).astype(sample.dtype)
-    return jnp.sum(jnp.where(finite, sample, 0) / count)
+def _sparse(plane: jax.Array) -> jax.Array:
+    return plane[tuple(slice(None, None, max(size // 32, 1)) for size in plane.shape)]
+
+
+def _sparse_mean(sample: jax.Array, counts: jax.Array | None) -> jax.Array:
+    sample = sample.astype(working_type(sample))
+    typical = jnp.abs(sample) < FARTHEST
+    if counts is not None:
+        typical &= counts
+    total = jnp.sum(jnp.where(typical, sample, 0))
+    return total / jnp.maximum(jnp.sum(typical), 1).astype(sample.dtype)
+
+
+def from_shift(plane: jax.Array, shift: jax.Array) -> jax.Array:
+    """A guide as the moments and the model take it: its distance from the shift, cut."""
+    return jnp.clip(plane - shift, -FARTHEST, FARTHEST)
 
 
 def working_type(*arrays: jax.Array) -> jnp.dtype:
@@ -114,8 +130,9 @@ def _strip_moments(
 ) -> jax.Array:
     """Moments of one row of blocks: `(rows, W, ...)` to `(K, w)`."""
     dtype = working_type(target, *jax.tree.leaves(guides))
-    x = [plane.astype(dtype) - s for plane, s in zip(planes(guides), shift, strict=True)]
-    y = [plane.astype(dtype) for plane in planes(target)]
+    x = [from_shift(p.astype(dtype), s) for p, s in zip(planes(guides), shift, strict=True)]
+    # Divided before they are summed: radiance near the type's maximum must not overflow.
+    y = [plane.astype(dtype) * (1 / block**2) for plane in planes(target)]
     good = jnp.all(jnp.isfinite(target), axis=-1)
     for layer in jax.tree.leaves(guides):
         good &= jnp.all(jnp.isfinite(layer), axis=-1)
@@ -134,8 +151,9 @@ def _strip_moments(
     for i in range(1, len(weighted)):
         products += [weighted[i], *(weighted[i] * x[j] for j in range(i))]
     products += [a * b for a in weighted for b in y]
+    divided = np.arange(len(products)) >= len(weighted) * (len(weighted) + 1) // 2
     # Rows first: contiguous additions; then the columns, with an eighth of the data.
     sums = jnp.stack([jnp.sum(product, axis=0) for product in products])
     missing = -sums.shape[1] % block
     sums = jnp.pad(sums, ((0, 0), (0, missing))).reshape(len(products), -1, block)
-    return jnp.sum(sums, axis=-1) / block**2
+    return jnp.sum(sums, axis=-1) * np.where(divided, 1, 1 / block**2).astype(dtype)[:, None]

@@ -76,13 +76,13 @@ def load_parameters(path: str | Path) -> tuple[Parameters, dict[str, Any]]:
         text = json.loads(Path(path).read_bytes())
     except FileNotFoundError:
         raise ValueError(f"{path}: there is no such file; --params wants {wanted}") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ValueError(f"{path}: cannot be read ({error}); it should be {wanted}") from None
     if not isinstance(text, dict) or text.get("format") != FORMAT or text.get("version") != VERSION:
         raise ValueError(f"{path}: not a parameter file; it should be {wanted}")
     try:
         values = {name: float(text[name]) for name in ("sigma", "eps", "eps_prime")}
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(
             f"{path}: sigma, eps and eps_prime must all be there as numbers; it should be {wanted}"
         ) from None

@@ -44,7 +44,7 @@ def flr(
     """
     checks.choice("solver", solver, SOLVERS)
     factor = check_regression(target, guides, guides_map, weight, block, support)
-    shift = centre(guides)
+    shift = centre(guides, weight)
     moments = collect(target, guides, shift, block, weight)
     step = block * factor
     moments = blur(moments, parameters.sigma / step, reach=-(-support // step))

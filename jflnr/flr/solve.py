@@ -28,17 +28,18 @@ def solve(
     The moments are those of X - shift. Eq. 18 reads, with mu the mean of X and W the covariance,
     `W + eps (mu mu^T + diag(mu^2)) + eps' I`; W does not depend on the shift, so it is taken from
     the shifted moments, where it loses no digits, and mu is shifted back. A window without a
-    single usable pixel gets the model 0.
+    single usable pixel, or whose moments overflow, gets the model 0.
 
     moments: `(K, h, w)`, blurred. shift: `(Q,)`. channels: the number C of target channels.
     Returns `(Q + 1, C, h, w)`: the value of Y at X = shift, then the slope of each guide.
     """
-    eps = parameters.eps.astype(moments.dtype)
-    eps_prime = parameters.eps_prime.astype(moments.dtype)
+    # At these limits nothing changes any more, and beyond them the numbers below overflow.
+    eps = jnp.minimum(parameters.eps.astype(moments.dtype), 1e4)
+    eps_prime = jnp.clip(parameters.eps_prime.astype(moments.dtype), 1e-30, 1e30)
     count = shift.size
     n = moments[0]
-    filled = n > 1e-12
-    means = moments * jnp.where(filled, 1 / jnp.where(filled, n, 1), 0)
+    filled = (n > 1e-12) & jnp.all(jnp.isfinite(moments), axis=0)
+    means = jnp.where(filled, moments, 0) / jnp.where(filled, n, 1)
 
     # Eq. 13 and 15, about the shift.
     first = np.array([index_xx(i + 1, 0) for i in range(count)], int)
