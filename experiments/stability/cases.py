@@ -146,7 +146,7 @@ def _step_in_flat_region(r: Room) -> Case:
 
 def _plane(r: Room) -> Case:
     """Normals that differ by rounding only, and a depth affine in the pixel."""
-    normal = np.float32([0.6, 0, 0.8]) + 1e-7 * r.rng.standard_normal((*r.x.shape, 3))
+    normal = np.array([0.6, 0, 0.8]) + 1e-7 * r.rng.standard_normal((*r.x.shape, 3))
     depth = 1 + 0.3 * r.x
     guides = np.concatenate([normal, depth[..., None], np.ones((*r.x.shape, 1))], -1)
     return r.case(guides, light=0.2 + 0.5 * depth, edge=False)
