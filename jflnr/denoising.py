@@ -104,6 +104,9 @@ def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
 
 def _check_sizes(frame: Frame) -> None:
     layers = {name: layer for name, layer in vars(frame).items() if name != "indirect"}
+    for name, layer in layers.items():
+        if layer is not None or name in ("normal", "depth"):
+            checks.image(name, layer, 1 if name in ("depth", "ao", "mask") else 3)
     checks.same_size(**layers)
     checks.image("indirect", frame.indirect)
     (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]
