@@ -32,11 +32,11 @@ def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def typical_depth(depth: Array, mask: Array | None) -> jax.Array:
-    """Median depth of the surfaces, from a regular grid of at most about 65 000 pixels; 1 if none.
+    """Median depth of the surfaces, from a regular grid of at most about 16 000 pixels; 1 if none.
 
     depth: `(H, W, 1)` in scene units. mask: `(H, W, 1)` or None. Returns a scalar.
     """
-    step = max(round((depth.shape[0] * depth.shape[1] / 65536) ** 0.5), 1)
+    step = max(round((depth.shape[0] * depth.shape[1] / 16384) ** 0.5), 1)
     sample = jnp.asarray(depth[::step, ::step, 0], jnp.float32)
     surface = sample > 0 if mask is None else jnp.asarray(mask[::step, ::step, 0]) > 0
     median = jnp.nanmedian(jnp.where(surface & jnp.isfinite(sample), sample, jnp.nan))
