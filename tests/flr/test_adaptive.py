@@ -105,6 +105,7 @@ def test_what_is_not_finite_is_as_good_as_masked(scene):
     assert np.isfinite(flr_adaptive(y * jnp.nan, x, ADAPTIVE_DEFAULT, levels=2)).all()
 
 
+@pytest.mark.slow  # compiles long
 @pytest.mark.parametrize("size", [(1, 1), (3, 70)])
 def test_small_and_odd_sizes(rng, size):
     x, y = jnp.float32(guides(rng, *size, 1)), jnp.float32(light(rng, *size))
@@ -113,12 +114,14 @@ def test_small_and_odd_sizes(rng, size):
     assert np.isfinite(out).all()
 
 
+@pytest.mark.slow  # compiles long
 def test_no_guides_at_all(scene):
     _, y = scene
     out = flr_adaptive(y, jnp.zeros((*y.shape[:2], 0)), ADAPTIVE_DEFAULT, levels=2)
     assert np.isfinite(out).all()
 
 
+@pytest.mark.slow  # compiles long
 def test_gradients_are_finite_and_of_use(scene):
     x, y = scene
 
