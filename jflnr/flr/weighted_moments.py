@@ -34,7 +34,7 @@ def collect_weighted(
 
     def strips(image: jax.Array) -> jax.Array:
         image = jnp.pad(image, [(0, missing)] + [(0, 0)] * (image.ndim - 1))
-        return image.reshape(-1, rows, *image.shape[1:])
+        return image.reshape(image.shape[0] // rows, rows, *image.shape[1:])
 
     def one(strip: tuple[jax.Array, Guides, jax.Array, jax.Array]) -> jax.Array:
         return _strip(*strip, shift=shift, block=block)
