@@ -139,6 +139,7 @@ def _render(folder: Path, manifest: Manifest, job: Job, source: Source) -> bool:
     layers, facts = frame.render(source.scene, camera, settings_of(job), near, state)
     facts = {"scene": job.scene, "view": job.view, "split": job.split} | facts
     frame.write(folder / job.name, layers, facts)
+    state.unlink(missing_ok=True)
     manifest.add(job.name, _without_matrix(facts))
     return True
 

@@ -82,19 +82,21 @@ class Accumulator:
         return f"{self.seed}/{s.bounces}/{s.mis}/{position!r}"
 
     def run(self, goal: Goal, report: Callable[[float, str], None] | None = None) -> None:
-        """Sample until the goal is met; saves its state on the way."""
+        """Sample until the goal is met; saves its state on the way, and when it is interrupted."""
         saved = time.monotonic()
         if not self.enough(goal):
             self.prepare()
-        while not self.enough(goal):
-            self._step(goal)
-            if report:
-                report(self.share(goal), f"{self.spp} spp, error {self.relative_error():.3f}")
-            if self.state is not None and time.monotonic() - saved > SAVE_EVERY:
-                self.save()
-                saved = time.monotonic()
-        if self.state is not None:
-            self.state.unlink(missing_ok=True)
+        try:
+            while not self.enough(goal):
+                self._step(goal)
+                if report:
+                    report(self.share(goal), f"{self.spp} spp, error {self.relative_error():.3f}")
+                if time.monotonic() - saved > SAVE_EVERY:
+                    self.save()
+                    saved = time.monotonic()
+        except KeyboardInterrupt:
+            self.save()
+            raise
 
     def prepare(self) -> None:
         """Teach the guide, then keep or drop multiple importance sampling, whichever is better."""
@@ -145,9 +147,8 @@ class Accumulator:
         left = -(-(goal.most_spp - self.spp) // REPLICATES)
         more = min(int(np.clip(each // 4, 16, 256)) // 16 * 16, max(left, 1))
         start = time.monotonic()
-        for i in range(REPLICATES):
-            seed = stream_seed(self.seed, i)
-            self.sums[i] += self._indirect(more, seed, each)
+        seeds = (stream_seed(self.seed, i) for i in range(REPLICATES))
+        self.sums += np.stack([self._indirect(more, seed, each) for seed in seeds])
         self.spp += REPLICATES * more
         if self.guide and self.spp <= STOP_LEARNING:
             self.guide.learn()
@@ -184,8 +185,9 @@ class Accumulator:
         return self.spp * pixels / max(self.seconds, 1e-9)
 
     def save(self) -> None:
-        """Write the state, atomically."""
-        assert self.state is not None
+        """Write the state, atomically, where there is a file for it."""
+        if self.state is None:
+            return
         self.state.parent.mkdir(parents=True, exist_ok=True)
         beside = self.state.with_suffix(".tmp.npz")
         content: dict[str, Any] = {"sums": self.sums, "spp": self.spp, "seconds": self.seconds}

@@ -115,6 +115,7 @@ def _write(
         layers["motion"] = motion_vectors(tracer, step, before)
     facts = {"scene": source.name, "split": split_of(source.name)} | facts | more
     frame.write(path, layers, facts, tuple(arguments.leave_out))
+    state.unlink(missing_ok=True)
     if path != arguments.output:  # a folder of frames has a manifest, a single frame its header
         entry = {k: v for k, v in facts.items() if k != "camera_to_world"}
         Manifest(path.parent).add(path.name, entry)
