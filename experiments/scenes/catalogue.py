@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from experiments.scenes import forms, nature, passages, rooms
+from experiments.scenes import colonnade, forms, nature, passages, rooms
 from experiments.scenes.room import room
 from experiments.scenes.world import World
 
@@ -12,7 +12,7 @@ FAMILIES: dict[str, Callable[[int], World]] = {
     "furnished": rooms.furnished,
     "sunlit": rooms.sunlit,
     "corridor": passages.corridor,
-    "colonnade": passages.colonnade,
+    "colonnade": colonnade.colonnade,
     "stairs": passages.stairs,
     "shelves": rooms.shelves,
     "foliage": nature.foliage,
