@@ -34,7 +34,9 @@ def guided_by_numpy(x, y, radius, eps):
     """He et al. (2010), equations 14 to 16, for several guide channels."""
     mean = lambda image: mean_over_windows(image, radius)
     mean_x, mean_y = mean(x), mean(y)
-    covariance = mean(x[..., :, None] * x[..., None, :]) - mean_x[..., :, None] * mean_x[..., None]
+    covariance = (
+        mean(x[..., :, None] * x[..., None, :]) - mean_x[..., :, None] * mean_x[..., None, :]
+    )
     cross = mean(x[..., :, None] * y[..., None, :])
     cross -= mean_x[..., :, None] * mean_y[..., None, :]
     slopes = np.linalg.solve(covariance + eps * np.eye(x.shape[-1]), cross)
