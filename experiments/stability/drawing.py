@@ -136,14 +136,15 @@ def _painted(image: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def tables(result: dict[str, Any], path: Path) -> None:
-    """A count per method, every figure of every cell, and the robust fits."""
+    """A count per method, the robust fits, and the figures of float32 and float16."""
     cells = result["cells"]
     text = "Cells that clear the bar, of all cases:\n\n" + results.table(*_counts(cells))
     columns = {"spp": "spp", "fit": "fit", "typical": "median error", "error": "error"}
     text += "\nRobust fits under heavy-tailed noise, relative to the mean light:\n\n"
     text += results.table(result["fireflies"], columns | {"bias": "bias"})
-    text += "\nEvery cell:\n\n"
-    shown = [{k: "NaN" if v is None and k in _LOST else v for k, v in c.items()} for c in cells]
+    text += "\nEvery cell of float32 and float16 (the others are in stability.json):\n\n"
+    some = [c for c in cells if c["precision"] in ("float32", "float16")]
+    shown = [{k: "NaN" if v is None and k in _LOST else v for k, v in c.items()} for c in some]
     text += results.table([{k: v for k, v in c.items() if v is not None} for c in shown], COLUMNS)
     plots.write_text(path, text)
 
