@@ -74,7 +74,12 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     shown = [row | {"front": "*" if row["front"] else ""} for row in rows]
     columns = {"method": "method", "psnr": "PSNR, dB", "ms": "ms, 640 x 360"}
     plots.write_text(folder / f"{stem}.md", results.table(shown, columns | {"front": "front"}))
-    with plots.figure(folder / f"{stem}.png", size=(9.5, 6.2)) as axis:
+    scatter(folder / f"{stem}.png", rows)
+
+
+def scatter(path: Path, rows: list[dict[str, Any]]) -> None:
+    """PSNR against time, the front drawn and named. rows: method, family, psnr, ms, front."""
+    with plots.figure(path, size=(9.5, 6.2)) as axis:
         for family in dict.fromkeys(row["family"] for row in rows):
             mark, colour = MARKS[family]
             mine = [row for row in rows if row["family"] == family]

@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments import data, plots, results, resume
 from experiments.methods import basic, ours, peers
+from experiments.pareto import MARKS, pareto_front, scatter
 from experiments.timing import times
 from jflnr.metrics import measure
 
@@ -71,13 +72,21 @@ def mean_of(rows: list[dict[str, Any]], method: str) -> dict[str, Any]:
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """table1.md: means with the paper's rows, then PSNR per frame."""
+    """table1.md: means with the paper's rows, then PSNR per frame; table1.png: PSNR and time."""
     rows = list(result["means"])
     for name, (psnr, ssim, flip, rmse) in NOT_MEASURED.items():
         figures = {"psnr": psnr, "ssim": ssim, "flip": flip, "rmse": rmse}
         rows.append({"method": f"{name} (not measured: the paper's, on its frames)"} | figures)
     text = results.table(rows, COLUMNS)
     plots.write_text(folder / f"{NAME}.md", text + "\n" + per_frame(result["frames"]))
+    timed = [row | {"family": family(row["method"])} for row in result["means"] if "ms" in row]
+    front = set(pareto_front([(row["ms"], row["psnr"]) for row in timed]))
+    scatter(folder / f"{NAME}.png", [r | {"front": i in front} for i, r in enumerate(timed)])
+
+
+def family(method: str) -> str:
+    """A key of `pareto.MARKS`, from a method's name."""
+    return next((f for f in MARKS if method.startswith(f)), "jflnr")
 
 
 def per_frame(frames: list[dict[str, Any]]) -> str:
