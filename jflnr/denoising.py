@@ -135,12 +135,10 @@ def _coarse_block(frame: Frame, block: int) -> int:
     return max(block // factor, 1)
 
 
-@functools.partial(jax.jit, static_argnames="names")
 def _images(frame: Frame, names: tuple[str, ...]) -> dict[str, Any]:
-    """The images that `flr` takes, from the layers of the frame."""
-    target = jnp.asarray(frame.indirect)
+    """The images that `flr` takes, from the layers of the frame; numpy's stay where they are."""
+    target, mask = frame.indirect, frame.mask
     layers = guide_layers.layers(frame, names)
-    mask = None if frame.mask is None else jnp.asarray(frame.mask)
     factor = -(-frame.normal.shape[0] // target.shape[0])
     if factor == 1:
         weight = None if mask is None else mask[..., 0] > 0

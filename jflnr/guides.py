@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -43,13 +44,13 @@ def typical_depth(depth: Array, mask: Array | None) -> jax.Array:
     return jnp.where(median > 0, median, 1)
 
 
-def layers(frame: Frame, names: Sequence[str]) -> tuple[jax.Array, ...]:
+def layers(frame: Frame, names: Sequence[str]) -> tuple[Any, ...]:
     """The guides as separate layers `(H, W, C)`, free of the scene's unit of length.
 
     Depth is divided by its median over the mask; so is the position, about a point of the scene.
     """
     scale = 1 / typical_depth(frame.depth, frame.mask)
-    chosen = {name: jnp.asarray(getattr(frame, name)) for name in names}
+    chosen = {name: getattr(frame, name) for name in names}
     if "depth" in chosen:
         chosen["depth"] = chosen["depth"] * scale
     if "position" in chosen:
@@ -59,12 +60,13 @@ def layers(frame: Frame, names: Sequence[str]) -> tuple[jax.Array, ...]:
     return tuple(chosen[name] for name in names)
 
 
-def shrink(image: jax.Array, factor: int, mask: jax.Array | None = None) -> jax.Array:
+def shrink(image: Array, factor: int, mask: Array | None = None) -> jax.Array:
     """Mean over `factor` x `factor` pixels, of those in the mask only.
 
     image: `(H, W, C)`. mask: `(H, W, 1)` or None. Returns `(ceil(H/f), ceil(W/f), C)`.
     """
-    weight = jnp.ones((*image.shape[:2], 1), image.dtype) if mask is None else mask
+    image = jnp.asarray(image)
+    weight = jnp.ones((*image.shape[:2], 1), image.dtype) if mask is None else jnp.asarray(mask)
     margins = [(0, -size % factor) for size in image.shape[:2]] + [(0, 0)]
 
     def totals(x: jax.Array) -> jax.Array:
