@@ -102,5 +102,5 @@ def _name(axis: Any, front: list[dict[str, Any]]) -> None:
             str(number), (row["ms"], row["psnr"]), xytext=(-4, 5), textcoords="offset points"
         )
     text = "\n".join(f"{number}  {row['method']}" for number, row in enumerate(front, 1))
-    place = {"transform": axis.transAxes, "va": "top", "fontsize": 8}
-    axis.text(0.01, 0.99, "Pareto front\n" + text, **place, bbox={"fc": "white", "alpha": 0.8})
+    place = {"transform": axis.transAxes, "va": "bottom", "fontsize": 8}
+    axis.text(0.01, 0.02, "Pareto front\n" + text, **place, bbox={"fc": "white", "alpha": 0.8})
