@@ -90,7 +90,8 @@ def test_what_is_not_finite_is_as_good_as_masked(rng):
     ours = flr(jnp.asarray(spoiled), jnp.asarray(x), PARAMETERS)
     masked = flr(jnp.asarray(y), jnp.asarray(x), PARAMETERS, weight=jnp.asarray(~bad))
     assert np.isfinite(ours).all()
-    np.testing.assert_array_equal(ours, masked)
+    # Up to rounding: the mask also says where the shift is taken.
+    np.testing.assert_allclose(ours, masked, atol=1e-5)
     x[3, 4, 1] = np.nan
     assert np.isfinite(flr(jnp.asarray(y), jnp.asarray(x), PARAMETERS)).all()
 
