@@ -14,9 +14,12 @@ import numpy as np
 
 import jflnr
 from experiments import data, plots, results
+from jflnr import opencl
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
 from jflnr.guides import layers
+from jflnr.opencl.context import default_context
+from jflnr.opencl.profile import profile
 
 NAME = "speed"
 QUESTION = "How many times the memory floor does FLR take, and how much less than OIDN?"
@@ -46,6 +49,7 @@ def run(quick: bool) -> dict[str, Any]:
     return {
         "methods": rows,
         "memory": memory(),
+        "kernels": kernels(frame),
         "pixels": [growth(megapixels=size) for size in sizes],
         "guides": [growth(guides=q) for q in ((0, 5) if quick else (0, 1, 2, 3, 5, 8, 12))],
         "channels": light_groups((3, 9) if quick else (3, 6, 9, 15)),
@@ -68,7 +72,20 @@ def methods_on(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
         denoise = functools.partial(jflnr.denoise, on_device, method)
         calls[f"denoise {method}, JAX"] = functools.partial(finished, denoise)
     calls["denoise flr, OpenCL"] = functools.partial(jflnr.denoise, frame, backend="opencl")
+    calls["flr, OpenCL"] = opencl_call(frame)
     return calls | oidn_calls(frame)
+
+
+def opencl_call(frame: jflnr.Frame) -> Callable[[], Any]:
+    """The four kernels on the same arrays as `flr, JAX`, in numpy."""
+    guides = np.concatenate(layers(frame, ("normal", "depth", "ao")), axis=-1)
+    return functools.partial(opencl.flr, np.asarray(frame.indirect), guides, DEFAULT)
+
+
+def kernels(frame: jflnr.Frame) -> list[dict[str, Any]]:
+    """Each kernel's time, bytes and share of the copy bandwidth."""
+    rows = profile(default_context(), opencl_call(frame))
+    return [row._asdict() | {"mb": row.bytes / 1e6} for row in rows]
 
 
 def finished(call: Callable[[], Any]) -> Any:
@@ -164,6 +181,13 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     text += "\n" + results.table([result["memory"]], {key: key for key in result["memory"]})
     groups = {"groups": "light groups", "together": "together, ms", "separate": "separately, ms"}
     text += "\n" + results.table(result["channels"], groups)
+    kernel_columns = {
+        "kernel": "kernel",
+        "ms": "ms",
+        "mb": "MB",
+        "share": "share of copy bandwidth",
+    }
+    text += "\n" + results.table(result["kernels"], kernel_columns)
     plots.write_text(folder / f"{NAME}.md", text)
     with plots.figure(folder / f"{NAME}.png", columns=2) as (left, right):
         plots.power_law(left, result["pixels"], "megapixels", "frame size, megapixels")
