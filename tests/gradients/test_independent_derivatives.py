@@ -89,12 +89,12 @@ def derivatives_agree(problem):
         back = normal(problem["channels"])
         forward, gradient = both(point, direction, back)
         by_reverse = sum(
-            jnp.vdot(g, d)
+            np.vdot(g, d)
             for g, d in zip(jax.tree.leaves(gradient), jax.tree.leaves(direction), strict=True)
         )
     scale = np.abs(forward).max() + 1e-6
     np.testing.assert_allclose(forward, richardson, atol=1e-7 * scale)
-    np.testing.assert_allclose(by_reverse, jnp.vdot(back, forward), atol=1e-9 * scale * back.size)
+    np.testing.assert_allclose(by_reverse, np.vdot(back, forward), atol=1e-9 * scale * back.size)
 
 
 @settings(max_examples=2, deadline=None, derandomize=True, database=None)
@@ -118,8 +118,9 @@ def test_smape(rng):
 
 @pytest.mark.parametrize("reference", [0.0, 1e-20, 1.0])
 def test_smape_where_it_has_a_corner(reference):
-    """Where the two agree, the one derivative that respects its symmetry is 0."""
-    black = jnp.zeros((2, 2, 3)) + reference
-    value, gradient = jax.value_and_grad(smape)(black, black)
+    """Where the two agree, also in the black, the derivative is that of one side."""
+    same = jnp.zeros((2, 2, 3)) + reference
+    value, gradient = jax.value_and_grad(smape)(same, same)
     assert value == 0
-    np.testing.assert_array_equal(gradient, 0)
+    slope = 1 / (same.size * max(2.001 * reference, 1e-12))
+    assert (np.abs(gradient) <= 1.001 * slope).all()
