@@ -85,7 +85,7 @@ def test_tracing_smaller_keeps_the_light(frame):
     np.testing.assert_allclose(small.indirect.mean(), frame.indirect.mean(), rtol=1e-4)
 
 
-@pytest.mark.parametrize("name", ["upsample", "lightgroups"])
+@pytest.mark.parametrize("name", ["upsample"])
 def test_quick_versions_leave_evidence_and_charts(name, tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "FOLDER", tmp_path / "cache")
     assert main(["run", name, "--quick", "--out", str(tmp_path)]) == 0

@@ -16,7 +16,7 @@ PEERS = {
     "a-trous": (atrous, atrous.PAPER),
     "svgf": (svgf, svgf.PAPER),
     "bmfr": (bmfr, bmfr.PAPER),
-    "bmfr, 4 grids": (bmfr, bmfr.PAPER | {"grids": 4}),
+    "bmfr, 2 grids": (bmfr, bmfr.PAPER | {"grids": 2}),
 }
 
 
