@@ -82,5 +82,5 @@ def draw(result: dict[str, Any], folder: Path) -> None:
             axis.set_xticks(sizes, map(str, sizes))
             axis.minorticks_off()
         left.set(ylabel="PSNR at 1 spp, dB")
-        right.set(ylabel="milliseconds at 640 x 360", ylim=(0, None))
+        right.set(ylabel="milliseconds at 640 x 360", yscale="log")
         left.legend(fontsize=8, loc="lower left")
