@@ -55,7 +55,7 @@ def flr_adaptive(
     check_regression(target, guides, None, weight, block, 1)
     checks.positive_integer("levels", levels)
     numbers = parameters.numbers()
-    shift = centre(guides, weight)
+    shift = centre(guides)
     light = jnp.einsum("hwc,c->hw", target, brightness(target.shape[-1], target.dtype))
 
     block = max(block // 2, 1)
