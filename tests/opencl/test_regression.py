@@ -168,7 +168,7 @@ def test_driven_as_a_gpu(gpu_like: Context, dtype: type) -> None:
 
 def test_real_frames(context: Context, data: Path) -> None:
     program = in_float64(jax_flr, parameters=DEFAULT)
-    for path in sorted(data.glob("train/*_0.exr"))[:2]:
+    for path in sorted(data.glob("*/*.exr")):
         frame = jflnr.read_frame(path, spp=1)
         layers = tuple(np.asarray(a) for a in guide_layers.layers(frame, guide_layers.DEFAULT))
         weight = np.asarray(frame.mask)[..., 0] > 0
