@@ -9,12 +9,14 @@ signal. Pass 3 evaluates the models. docs/adaptive.md derives the steps.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 
 from jflnr import checks
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.apply import apply
+from jflnr.flr.apply import apply, apply_rows, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
 from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, predict
@@ -25,6 +27,17 @@ from jflnr.flr.weighted_moments import collect_weighted
 
 BLOCK = 8
 LEVELS = 4
+
+
+class Pilot(NamedTuple):
+    """The first fit, of the brightness at blocks of 16 pixels (four of the finest).
+
+    coefficients: `(Q + 1, 1, h + 2, w)`, a row of blocks beyond each border. mean: brightness of
+    the frame.
+    """
+
+    coefficients: jax.Array
+    mean: jax.Array
 
 
 def flr_adaptive(
@@ -56,45 +69,74 @@ def flr_adaptive(
     checks.positive_integer("levels", levels)
     numbers = parameters.numbers()
     shift = centre(guides)
-    light = jnp.einsum("hwc,c->hw", target, brightness(target.shape[-1], target.dtype))
-
     block = max(block // 2, 1)
-    moments = collect(light[..., None], guides, shift, 2 * block, weight)
-    mean = _frame_mean(moments, shift.size)
-    weights, squares = _weights(light, guides, shift, moments, mean, weight, numbers, block)
-    grid = Grid(*collect_weighted(target, guides, shift, weights, squares, block), block)
-    coefficients = _fit_pyramid(grid, shift, target.shape[-1], levels, mean, numbers)
+    moments = collect_light(target, guides, shift, weight, block)
+    mean = frame_mean(moments, shift.size)
+    pilot = Pilot(with_borders(fit_pilot(moments, mean, shift, numbers, block)), mean)
+    grid = collect_grid(target, guides, shift, pilot, weight, numbers, block)
+    coefficients = fit_pyramid(grid, shift, target.shape[-1], levels, mean, numbers)
     coefficients = restore(coefficients, moments, shift.size, numbers.slack)
     image = apply(coefficients, guides, shift, block)
-    return rescale(image, light, weight) if keep_energy else image
+    return rescale(image, light_of(target), weight) if keep_energy else image
 
 
-def _frame_mean(moments: jax.Array, guides: int) -> jax.Array:
+def light_of(target: jax.Array) -> jax.Array:
+    """Brightness of the pixels, `(H, W, C)` to `(H, W)`."""
+    return jnp.einsum("hwc,c->hw", target, brightness(target.shape[-1], target.dtype))
+
+
+def collect_light(
+    target: jax.Array, guides: Guides, shift: jax.Array, weight: jax.Array | None, block: int
+) -> jax.Array:
+    """Pass 1: unweighted moments of the brightness, on blocks twice as large as `block`."""
+    return collect(light_of(target)[..., None], guides, shift, 2 * block, weight)
+
+
+def frame_mean(moments: jax.Array, guides: int) -> jax.Array:
     """Mean brightness of the usable pixels; 1 if there is no light, where any scale will do."""
     mean = jnp.sum(moments[index_xy(0, 0, guides, 1)]) / jnp.maximum(jnp.sum(moments[0]), 1e-12)
     return jnp.where(mean > 0, mean, 1)
 
 
-def _weights(
-    light: jax.Array,
+def fit_pilot(
+    moments: jax.Array, mean: jax.Array, shift: jax.Array, numbers: AdaptiveParameters, block: int
+) -> jax.Array:
+    """Models of the brightness from the moments of pass 1. Returns `(Q + 1, 1, h, w)`."""
+    grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
+    features = _guide_features(grid, shift.size, numbers)
+    return fit_level(grid, features, shift, 1, mean, numbers).coefficients
+
+
+def collect_grid(
+    target: jax.Array,
     guides: Guides,
     shift: jax.Array,
-    moments: jax.Array,
-    mean: jax.Array,
+    pilot: Pilot,
     weight: jax.Array | None,
     numbers: AdaptiveParameters,
     block: int,
+) -> Grid:
+    """Pass 2: moments of the weighted pixels on the finest blocks."""
+    expected = apply_rows(pilot.coefficients, guides, shift, 4 * block)[..., 0]
+    light = light_of(target)
+    weights, squares = _weights(light, guides, expected, pilot.mean, weight, numbers)
+    return Grid(*collect_weighted(target, guides, shift, weights, squares, block), block)
+
+
+def _weights(
+    light: jax.Array,
+    guides: Guides,
+    expected: jax.Array,
+    mean: jax.Array,
+    weight: jax.Array | None,
+    numbers: AdaptiveParameters,
 ) -> tuple[jax.Array, jax.Array]:
-    """Each pixel's weight from a first fit of the brightness, and the noise that leaves.
+    """Each pixel's weight from what the pilot expects, and the noise that leaves.
 
     The variance of a pixel grows with its brightness, and the best weight is one over it.
-    light: `(H, W)`. moments: of `light`, on blocks twice as large as `block`.
+    light, expected: `(H, W)`.
     Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
     """
-    grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
-    features = _guide_features(grid, shift.size, numbers)
-    pilot = fit_level(grid, features, shift, 1, mean, numbers)
-    expected = apply(pilot.coefficients, guides, shift, 4 * block)[..., 0]
     # The floor is there for the derivative of the power at 0.
     relative = jnp.maximum(expected / mean, 1e-6)
     weights = 1 / (relative**numbers.exponent + numbers.offset)
@@ -108,7 +150,7 @@ def _weights(
     return weights, jnp.where(usable, weights * (light - expected), 0) ** 2
 
 
-def _fit_pyramid(
+def fit_pyramid(
     grid: Grid,
     shift: jax.Array,
     channels: int,

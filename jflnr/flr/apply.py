@@ -20,10 +20,27 @@ def apply(coefficients: jax.Array, guides: Guides, shift: jax.Array, block: int)
     coefficients: `(Q + 1, C, h, w)`, from `solve`. guides: `(H, W, Q)`. shift: `(Q,)`.
     Returns `(H, W, C)`.
     """
+    return apply_rows(with_borders(coefficients), guides, shift, block)
+
+
+def with_borders(coefficients: jax.Array) -> jax.Array:
+    """The first and the last row of blocks repeated: `(Q + 1, C, h, w)` to `(Q + 1, C, h + 2, w)`.
+
+    So the interpolation is clamped at a frame's borders.
+    """
+    return jnp.pad(coefficients, ((0, 0), (0, 0), (1, 1), (0, 0)), mode="edge")
+
+
+def apply_rows(coefficients: jax.Array, guides: Guides, shift: jax.Array, block: int) -> jax.Array:
+    """`apply` on some whole rows of blocks of a frame.
+
+    coefficients: `(Q + 1, C, h + 2, w)`, with the rows of blocks above and below.
+    """
     height = jax.tree.leaves(guides)[0].shape[0]
     rows = height // block
-    above, below = _neighbours(coefficients, axis=2)
-    grids = [jnp.moveaxis(grid, 2, 0) for grid in (above, coefficients, below)]
+    size = coefficients.shape[2] - 2
+    moved = (lax.slice_in_dim(coefficients, k, k + size, axis=2) for k in range(3))
+    grids = [jnp.moveaxis(grid, 2, 0) for grid in moved]
 
     def strip(arrays: tuple[Guides, jax.Array, jax.Array, jax.Array]) -> jax.Array:
         return _apply_strip(*arrays, shift=shift, block=block)
@@ -86,13 +103,3 @@ def _hat(block: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     position = (np.arange(block) + 0.5) / block - 0.5
     before, after = np.maximum(-position, 0), np.maximum(position, 0)
     return before, 1 - before - after, after
-
-
-def _neighbours(grid: jax.Array, axis: int) -> tuple[jax.Array, jax.Array]:
-    """The grid moved by one block either way, its border repeated."""
-    size = grid.shape[axis]
-    first = lax.slice_in_dim(grid, 0, 1, axis=axis)
-    last = lax.slice_in_dim(grid, size - 1, size, axis=axis)
-    before = jnp.concatenate([first, lax.slice_in_dim(grid, 0, size - 1, axis=axis)], axis)
-    after = jnp.concatenate([lax.slice_in_dim(grid, 1, size, axis=axis), last], axis)
-    return before, after
