@@ -89,13 +89,19 @@ def ssim(picture: np.ndarray, reference: np.ndarray) -> float | None:
 
 def flip(picture: np.ndarray, reference: np.ndarray) -> float | None:
     """Mean LDR-FLIP of two displayed pictures; None without the package flip-evaluator."""
+    errors = flip_map(picture, reference)
+    return None if errors is None else float(np.mean(errors, dtype=np.float64))
+
+
+def flip_map(picture: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
+    """LDR-FLIP of every pixel (H, W) of two displayed pictures, from 0 to 1; None as `flip`."""
     try:
         from flip_evaluator import evaluate
     except ImportError:
         return None
     pair = (reference.astype(np.float32), picture.astype(np.float32))
-    _, mean, _ = evaluate(*pair, "LDR", inputsRGB=True, applyMagma=False, computeMeanError=True)
-    return float(mean)
+    errors, _, _ = evaluate(*pair, "LDR", inputsRGB=True, applyMagma=False, computeMeanError=False)
+    return errors[..., 0]
 
 
 def relative_mse(picture: np.ndarray, reference: np.ndarray) -> float:

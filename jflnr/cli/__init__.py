@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import denoise, devices, fit, info, metrics
+from jflnr.cli import denoise, devices, fit, info, metrics, report
 from jflnr.cli.common import INPUT_ERRORS, sentence
 
 COMMANDS = {
     "denoise": denoise,
     "info": info,
     "metrics": metrics,
+    "report": report,
     "fit": fit,
     "devices": devices,
 }

@@ -1,0 +1,43 @@
+"""report: compare pictures in one HTML page.
+
+IN are frames, files that `jflnr denoise` wrote from them, or plain R, G, B pictures. The page
+needs no network and no other file. It shows the real values at any exposure, splits, flips, zooms,
+and maps the errors where there is a reference: the frame's own, or for plain pictures --reference.
+
+    jflnr denoise room.exr -o out
+    jflnr report room.exr out/room.exr -o report.html
+
+A version is named by its file, or by its folder where the file is named like the frame.
+"""
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("inputs", metavar="IN", nargs="+", type=Path, help="EXR files, or folders of them")
+    add("-o", "--output", metavar="OUT", type=Path, required=True, help="HTML file to write")
+    add("--spp", type=int, default=1, metavar="N", help="noisy layer indirect_N of a frame (1)")
+    add("--reference", metavar="FILE", type=Path, help="what plain pictures are measured against")
+    add("--title", help="heading of the page (the scenes' names)")
+    add("--overwrite", action="store_true", help="replace OUT if it exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from jflnr.cli.jobs import expand, make_folder
+    from jflnr.report.page import write_report
+    from jflnr.report.scenes import collect
+
+    output = arguments.output
+    if output.is_dir():
+        raise IsADirectoryError(f"{output} is a folder; name the HTML file to write")
+    if output.exists() and not arguments.overwrite:
+        print(f"{output} kept as it is; --overwrite replaces it")
+        return 0
+    scenes = collect(expand(arguments.inputs), arguments.spp, arguments.reference)
+    make_folder(output)
+    title = arguments.title or ", ".join(scene.name for scene in scenes)
+    write_report(output, scenes, title)
+    print(f"{output} ({output.stat().st_size / 1e6:.1f} MB)")
+    return 0

@@ -1,0 +1,40 @@
+"""Where to look first: the squares in which the versions of a scene differ most."""
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from jflnr.metrics import display, exposure
+from jflnr.report.scenes import NOISY, REFERENCE, Scene
+
+SIZE = 64
+COUNT = 2
+
+
+def find_crops(scene: Scene, size: int = SIZE, count: int = COUNT) -> list[dict[str, int]]:
+    """Squares `{"x", "y", "size"}` inside the picture, far apart, the most different first."""
+    height, width = scene.size
+    size = min(size, height, width)
+    spread = uniform_filter(_spread(scene), size, mode="nearest")
+    half = size // 2
+    # Only centres whose square lies inside.
+    inside = spread[half : height - size + half + 1, half : width - size + half + 1]
+    found = []
+    for _ in range(count):
+        y, x = (int(i) for i in np.unravel_index(np.argmax(inside), inside.shape))
+        if inside[y, x] < 0:
+            break
+        found.append({"x": x, "y": y, "size": size})
+        inside[max(y - size + 1, 0) : y + size, max(x - size + 1, 0) : x + size] = -1
+    return found
+
+
+def _spread(scene: Scene) -> np.ndarray:
+    """How far the errors of the versions lie apart at every pixel, as displayed, (H, W)."""
+    lights = {name: np.nan_to_num(scene.radiance(image)) for name, image in scene.images.items()}
+    basis = lights.get(REFERENCE, list(lights.values())[-1])
+    wanted = display(basis, exposure(basis))
+    judged = [n for n in lights if n not in (NOISY, REFERENCE)] or list(lights)
+    errors = [
+        np.mean((display(lights[name], exposure(basis)) - wanted) ** 2, axis=-1) for name in judged
+    ]
+    return np.ptp(errors, axis=0) if len(errors) > 1 else errors[0]

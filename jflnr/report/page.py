@@ -1,0 +1,149 @@
+"""Writing the page: pictures as half floats, deflated, in base64, inside the HTML itself."""
+
+import base64
+import html
+import json
+import re
+import zlib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jflnr.cli.common import LABELS
+from jflnr.files import write_atomically
+from jflnr.frame import HALF_MAX, Frame
+from jflnr.metrics import RELATIVE_EPSILON, display, exposure, flip_map
+from jflnr.report.crops import find_crops
+from jflnr.report.scenes import REFERENCE, Scene
+
+SCRIPTS = ("data.js", "tone.js", "viewer.js", "panel.js", "keys.js", "tables.js", "main.js")
+LOWER_IS_BETTER = ("flip", "rmse", "smape", "mse", "mse_unbiased", "ms")
+
+
+def write_report(
+    path: Path,
+    scenes: Sequence[Scene],
+    title: str,
+    tables: Sequence[Mapping[str, Any]] = (),
+    chart: Mapping[str, Any] | None = None,
+) -> None:
+    """Write one HTML file that needs no other, atomically.
+
+    tables: more tables, each `{"title", "note", "columns": {key: heading}, "rows": [{key: value}]}`.
+    chart: `{"title", "x": key, "rows": [{"method", "family", key: number, ...}]}`, drawn against
+    any metric that the rows have.
+    """
+    content = {
+        "scenes": [scene_data(scene) for scene in scenes],
+        "tables": list(tables),
+        "chart": chart,
+        "labels": LABELS | {"ms": "ms"},
+        "lower": LOWER_IS_BETTER,
+        "epsilon": RELATIVE_EPSILON,
+    }
+    write_atomically(path, page(title, content).encode())
+
+
+def page(title: str, content: Mapping[str, Any]) -> str:
+    """The template with styles, scripts and data put in."""
+    folder = files("jflnr.report") / "page"
+
+    def read(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    # JavaScript, not JSON: NaN and Infinity stay. No "<": nothing can end the script early.
+    data = json.dumps(content).replace("<", "\\u003c")
+    parts = {
+        "STYLE": read("style.css"),
+        "CHART": read("chart.umd.min.js") if content["chart"] else "",
+        "SCRIPT": "\n".join(map(read, SCRIPTS)),
+        "TITLE": html.escape(title),
+        "DATA": data,
+    }
+    return re.sub("%%([A-Z]+)%%", lambda mark: parts[mark[1]], read("page.html"))
+
+
+def scene_data(scene: Scene) -> dict[str, Any]:
+    """What the page needs to know of one scene, as JSON values."""
+    unit = _unit(scene)
+    layers = {} if scene.frame is None else _layers(scene.frame, unit)
+    return {
+        "name": scene.name,
+        "height": scene.size[0],
+        "width": scene.size[1],
+        "unit": unit,
+        "exposures": _exposures(scene),
+        "layers": layers,
+        "images": [_image(scene, name, unit) for name in scene.images],
+        "crops": find_crops(scene),
+    }
+
+
+def _image(scene: Scene, name: str, unit: float) -> dict[str, Any]:
+    measured = REFERENCE in scene.images and name != REFERENCE
+    errors = _flip(scene, name) if measured else None
+    return {
+        "name": name,
+        "light": pack(scene.images[name] / unit),
+        "flip": None if errors is None else _deflated(np.uint8(np.round(255 * errors)).tobytes()),
+        "metrics": scene.measure(name) if measured else None,
+    }
+
+
+def _flip(scene: Scene, name: str) -> np.ndarray | None:
+    """The map of FLIP, whose mean is the metric; None where there is a NaN or an infinity."""
+    x, y = (scene.radiance(scene.images[n]) for n in (name, REFERENCE))
+    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        return None
+    scale = exposure(y)
+    return flip_map(display(x, scale), display(y, scale))
+
+
+def _layers(frame: Frame, unit: float) -> dict[str, str]:
+    """What puts the picture together around the indirect light; a layer that is absent is left out."""
+    found = {"albedo": pack(np.asarray(frame.albedo))}
+    for name, image in (("direct", frame.direct), ("emission", frame.emission)):
+        if image is not None:
+            found[name] = pack(np.asarray(image) / unit)
+    return found
+
+
+def _unit(scene: Scene) -> float:
+    """A power of two near the mean light, so that dividing by it is exact and suits half floats."""
+    mean = _mean(_judge(scene))
+    return 2.0 ** round(np.log2(mean)) if 0 < mean < np.inf else 1.0
+
+
+def _exposures(scene: Scene) -> dict[str, float]:
+    """The factor that each view is shown with: the metrics' rule, on what reflects."""
+    judge = _judge(scene)
+    lights = {"reflected": scene.radiance(judge)}
+    if scene.frame is not None:
+        direct = 0 if scene.frame.direct is None else np.asarray(scene.frame.direct)
+        lights |= {"picture": scene.radiance(judge + direct), "light": judge}
+    return {
+        name: exposure(np.nan_to_num(light, posinf=0, neginf=0)) for name, light in lights.items()
+    }
+
+
+def _judge(scene: Scene) -> np.ndarray:
+    """The version that sets the brightness for all: the reference, else the last."""
+    return scene.images.get(REFERENCE, list(scene.images.values())[-1])
+
+
+def _mean(image: np.ndarray) -> float:
+    return float(np.mean(np.abs(image[np.isfinite(image)]), dtype=np.float64))
+
+
+def pack(image: np.ndarray) -> str:
+    """An (H, W, 3) image as base64 of deflated half floats: planes, high bytes before low ones."""
+    limited = np.clip(image, -HALF_MAX, HALF_MAX, where=np.isfinite(image), out=np.array(image))
+    bits = np.ascontiguousarray(limited.transpose(2, 0, 1).astype(np.float16)).view(np.uint16)
+    return _deflated(np.stack([bits >> 8, bits & 255]).astype(np.uint8).tobytes())
+
+
+def _deflated(data: bytes) -> str:
+    return base64.b64encode(zlib.compress(data, 9)).decode()

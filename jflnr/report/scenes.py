@@ -1,0 +1,126 @@
+"""What a page compares: one frame, or pictures without one, in several versions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from jflnr import checks, exr, layouts, metrics
+from jflnr.frame import Frame, read_frame
+
+NOISY = "noisy"
+REFERENCE = "reference"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Versions of one picture, (H, W, 3) float32 each, under the names of the page.
+
+    With a `frame` they are demodulated indirect light, without one radiance. The version called
+    `reference`, if there is one, is what the others are measured against, and comes last.
+    """
+
+    name: str
+    images: dict[str, np.ndarray]
+    frame: Frame | None = None
+    size: tuple[int, int] = field(init=False)  # (H, W)
+
+    def __post_init__(self) -> None:
+        checks.same_size(**self.images, frame=self.frame and self.frame.albedo)
+        object.__setattr__(self, "size", next(iter(self.images.values())).shape[:2])
+
+    def radiance(self, image: np.ndarray) -> np.ndarray:
+        """What is measured, (H, W, 3) float64: the light that `image` reflects, or itself."""
+        with np.errstate(invalid="ignore"):  # black times infinite
+            shown = image if self.frame is None else np.asarray(self.frame.albedo) * image
+        return np.asarray(shown, np.float64)
+
+    def measure(self, name: str) -> dict[str, float | None]:
+        """The metrics of version `name` against the reference."""
+        if self.frame is None:
+            return metrics.compare(self.images[name], self.images[REFERENCE])
+        return metrics.measure(self.frame, self.images[name])
+
+
+def of_frame(name: str, frame: Frame, lights: dict[str, np.ndarray]) -> Scene:
+    """The frame's noisy light, the denoised `lights`, and its reference if it has one."""
+    images = {NOISY: np.asarray(frame.indirect), **lights}
+    if frame.reference is not None:
+        images[REFERENCE] = np.asarray(frame.reference)
+    return Scene(name, images, frame)
+
+
+def collect(paths: Sequence[Path], spp: int, reference: Path | None) -> list[Scene]:
+    """Read files of any kind and put together what belongs together.
+
+    A frame starts a scene, with its noisy light `indirect_{spp}` and its reference. What
+    `jflnr denoise` wrote joins the one frame there is or, of several, the one whose name it has.
+    Without frames, plain R, G, B are compared, against those of the file `reference`.
+    Raises OSError and ValueError, in one sentence, for what cannot be compared.
+    """
+    channels = {path: exr.read_channels(path) for path in paths}
+    frames = [path for path in paths if not _is_picture(channels[path])]
+    pictures = [path for path in paths if path not in frames]
+    if not frames:
+        return [_plain(pictures, channels, reference)]
+    if reference is not None:
+        raise ValueError(f"--reference is for plain pictures, and {frames[0]} is a frame")
+    owners = {path: _owner(path, frames) for path in pictures}
+    scenes = []
+    for source in frames:
+        names = _names([path for path in pictures if owners[path] == source], source.stem)
+        lights = {name: _light(channels[path], path) for path, name in names.items()}
+        scenes.append(of_frame(source.stem, read_frame(source, spp), lights))
+    return scenes
+
+
+def _is_picture(channels: dict[str, np.ndarray]) -> bool:
+    """Whether this is one finished image, and no frame with guides."""
+    return "indirect.R" in channels or set(channels) <= set("RGBA")
+
+
+def _plain(paths: Sequence[Path], channels: dict, reference: Path | None) -> Scene:
+    names = _names(paths)
+    images = {
+        name: layouts.layer(channels[p], "", tuple("RGB"), str(p)) for p, name in names.items()
+    }
+    if reference is not None:
+        found = exr.read_channels(reference)
+        images[REFERENCE] = layouts.layer(found, "", tuple("RGB"), str(reference))
+    return Scene(paths[0].stem if len(paths) == 1 else "pictures", images)
+
+
+def _owner(path: Path, frames: Sequence[Path]) -> Path:
+    if len(frames) == 1:
+        return frames[0]
+    if same := [frame for frame in frames if frame.name == path.name]:
+        return same[0]
+    raise ValueError(
+        f"{path}: there are several frames and none is called {path.name}, so that it cannot be "
+        "told which one this was denoised from"
+    )
+
+
+def _names(paths: Sequence[Path], frame: str | None = None) -> dict[Path, str]:
+    """The shortest names: the file's, or its folder's where it is named like its frame."""
+    for name in (
+        lambda path: path.parent.resolve().name if path.stem == frame else path.stem,
+        lambda path: path.parent.resolve().name,
+        lambda path: f"{path.parent.resolve().name}/{path.stem}",
+        str,
+    ):
+        names = {path: name(path) for path in paths}
+        if len({NOISY, REFERENCE, "", *names.values()}) == len(names) + 3:
+            return names
+    raise ValueError(f"{paths[0]}: this file is given twice, or called {NOISY} or {REFERENCE}")
+
+
+def _light(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
+    names = tuple(f"indirect.{c}" for c in "RGB")
+    if "indirect.R" not in channels:
+        raise ValueError(
+            f"{path} holds no layer indirect, so that it cannot be compared with a frame; "
+            "leave the frame out to compare plain pictures"
+        )
+    return layouts.layer(channels, "indirect", names, str(path))
