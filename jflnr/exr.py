@@ -23,6 +23,11 @@ PathLike = str | os.PathLike[str]
 COMPONENTS = "RGBAXYZ"
 TYPES = {"float16": "half", "float32": "float", "uint32": "uint"}
 MAGIC = b"\x76\x2f\x31\x01"
+# Attributes that say how the pixels are stored; `comments` is told apart from the others.
+STRUCTURE = (
+    *("channels", "chunkCount", "comments", "compression", "dataWindow", "displayWindow"),
+    *("lineOrder", "name", "tiles", "type", "version"),
+)
 # A small damaged header can announce any size. No real frame packs better than this.
 ALWAYS_ALLOWED_BYTES = 1 << 30
 PACKED_AT_MOST = 1000
@@ -42,6 +47,7 @@ class Attributes(NamedTuple):
     compression: str
     parts: int
     window: Window
+    others: dict[str, Any]  # as the program that wrote the file named them
 
 
 def layer_of(channel: str) -> str:
@@ -69,6 +75,7 @@ def read_attributes(path: PathLike) -> Attributes:
         compression=header["compression"].name.removesuffix("_COMPRESSION"),
         parts=len(parts),
         window=Window((int(x0), int(y0)), (int(low[0]), int(low[1]), int(high[0]), int(high[1]))),
+        others={name: value for name, value in header.items() if name not in STRUCTURE},
     )
 
 
@@ -100,10 +107,12 @@ def write_channels(
     channels: Mapping[str, np.ndarray],
     comments: str | None = None,
     window: Window | None = None,
+    others: Mapping[str, Any] | None = None,
 ) -> None:
     """Write (H, W) channels of float16, float32 or uint32 as one part, atomically.
 
     `window` places the image; without it, it starts at 0, 0 and fills the display window.
+    `others` are further attributes of the header.
     """
     path = Path(path)
     _check_sizes(path, channels)
@@ -112,7 +121,7 @@ def write_channels(
     height, width = next(iter(channels.values())).shape
     (x, y), display = window or Window()
     corners = (x, y, x + width - 1, y + height - 1)
-    header = {
+    header = dict(others or {}) | {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "dataWindow": _box(corners),

@@ -4,6 +4,7 @@ Layers and their meaning are DESIGN.md's ("The frame").
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -32,31 +33,35 @@ class Frame:
     position: Array | None = None  # (H, W, 3) world space
     ao: Array | None = None  # (H, W, 1) share of free rays
     mask: Array | None = None  # (H, W, 1) 1 where there is a surface to denoise
-    emission: Array | None = None  # (H, W, 3) light that the surface itself emits, or the sky
+    emission: Array | None = None  # (H, W, 3) what else the picture holds: emitted light, sky, ...
     direct: Array | None = None  # (H, W, 3) converged direct light
     reference: Array | None = None  # (H, W, 3) converged indirect light
     reference_a: Array | None = None  # (H, W, 3) mean of the first half of its samples
     motion: Array | None = None  # (H, W, 2) pixels to where this point was one frame ago
 
 
-def read_frame(path: exr.PathLike, spp: int = 1) -> Frame:
-    """Read the frame at `path` with its noisy layer `indirect_{spp}`.
+def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | None = None) -> Frame:
+    """Read the frame at `path`, an EXR file of ours or of another renderer (docs/layouts.md).
+
+    spp: of a file of ours, take the noisy layer `indirect_{spp}`. layers: for layers that are not
+    found by themselves, the name of the file's layer, its channels with commas between them, or
+    another file: `{"albedo": "diffuse.colour", "depth": "Z", "normal": "normals.exr"}`.
 
     Raises OSError for a file that cannot be opened, and ValueError, in one sentence, for one that
     is not a usable frame.
     """
     checks.positive_integer("spp", spp)
-    channels = exr.read_channels(path)
-    return Frame(**layouts.assemble(channels, layouts.native(spp), str(path)))  # type: ignore[arg-type]
+    return frame_of(layouts.load(path, spp, layers))
+
+
+def frame_of(source: layouts.Source) -> Frame:
+    """The frame in a file that `layouts.load` read; raises as `read_frame` does."""
+    return Frame(**layouts.assemble(source))  # type: ignore[arg-type]
 
 
 def read_header(path: exr.PathLike) -> dict:
     """The JSON object in the header's `comments` (scene, camera, ...); {} if there is none."""
-    try:
-        header = json.loads(exr.read_attributes(path).comments)
-    except json.JSONDecodeError:
-        return {}
-    return header if isinstance(header, dict) else {}
+    return layouts.parse_header(exr.read_attributes(path).comments)
 
 
 def write_frame(path: exr.PathLike, frame: Frame, spp: int = 1, header: dict | None = None) -> None:
@@ -65,7 +70,7 @@ def write_frame(path: exr.PathLike, frame: Frame, spp: int = 1, header: dict | N
     Depth is stored as float, the rest as half, unless a layer has values that half cannot hold.
     """
     channels: dict[str, np.ndarray] = {}
-    for layer, names in layouts.native(spp).items():
+    for layer, names in layouts.native.layout(spp).channels.items():
         if (image := getattr(frame, layer)) is not None:
             checks.image(layer, image, len(names))
             pixels = np.asarray(image, np.float32)

@@ -36,7 +36,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_channels_survive_with_type_comments_and_window(tmp_path: Path) -> None:
+def test_channels_survive_with_type_header_and_window(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
     channels = {
         "R": pixels(),
@@ -44,13 +44,17 @@ def test_channels_survive_with_type_comments_and_window(tmp_path: Path) -> None:
         "id.I": np.arange(9 * 13, dtype=np.uint32).reshape(9, 13),
     }
     window = exr.Window(origin=(5, -7), display=(0, 0, 99, 49))
-    exr.write_channels(path, channels, comments='{"scene": "é"}', window=window)
+    others = {"Camera": "left", "worldToCamera": 2 * np.eye(4, dtype=np.float32)}
+    exr.write_channels(path, channels, '{"scene": "é"}', window, others)
     read = exr.read_channels(path)
     assert read.keys() == channels.keys()
     for name, expected in channels.items():
         assert read[name].dtype == expected.dtype
         np.testing.assert_array_equal(read[name], expected)
-    assert exr.read_attributes(path) == exr.Attributes('{"scene": "é"}', "ZIP", 1, window)
+    attributes = exr.read_attributes(path)
+    assert attributes[:4] == ('{"scene": "é"}', "ZIP", 1, window)
+    assert attributes.others["Camera"] == "left"
+    np.testing.assert_array_equal(attributes.others["worldToCamera"], others["worldToCamera"])
 
 
 def test_values_that_are_not_finite_survive(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """What several commands share: how errors read, how numbers are shown."""
 
+import argparse
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -24,6 +25,25 @@ def sentence(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def add_map(parser: argparse.ArgumentParser) -> None:
+    """The option `--map`, whose values arrive as pairs."""
+    parser.add_argument(
+        "--map",
+        type=_pair,
+        action="append",
+        default=[],
+        metavar="LAYER=WHERE",
+        help="take LAYER from the file's layer, channels or other file WHERE (docs/layouts.md)",
+    )
+
+
+def _pair(text: str) -> tuple[str, str]:
+    layer, equals, where = text.partition("=")
+    if not (layer and equals and where):
+        raise argparse.ArgumentTypeError(f"LAYER=WHERE is wanted, as in depth=Z; got {text!r}")
+    return layer, where
 
 
 def guide_names(text: str) -> tuple[str, ...]:

@@ -1,4 +1,8 @@
-"""info: show what is in an EXR file and what the denoiser would use of it."""
+"""info: show what is in an EXR file and what the denoiser would use of it.
+
+Names the program whose layout it is, each layer with its range, and where `jflnr denoise` would
+take the noisy light and the guides from.
+"""
 
 import argparse
 from pathlib import Path
@@ -7,23 +11,31 @@ from typing import Any
 import numpy as np
 
 from jflnr import exr, layouts
-from jflnr.cli.common import table, to_json
+from jflnr.cli.common import add_map, table, to_json
+
+EXAMPLES = """\
+  jflnr info render.exr
+  jflnr info render.exr --map albedo=diffuse.colour
+  jflnr info render.exr --json
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="an EXR file")
+    add_map(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    facts = describe(arguments.file)
+    facts = describe(arguments.file, dict(arguments.map))
     print(to_json(facts) if arguments.json else as_text(facts))
     return 0
 
 
-def describe(path: Path) -> dict[str, Any]:
+def describe(path: Path, layers: dict[str, str] | None = None) -> dict[str, Any]:
     """Size, layers and use of the file at `path`, as plain values."""
-    attributes, channels = exr.read_attributes(path), exr.read_channels(path)
+    source = layouts.load(path, layers=layers)
+    attributes, channels = source.attributes, source.channels
     height, width = next(iter(channels.values())).shape
     return {
         "file": str(path),
@@ -33,7 +45,7 @@ def describe(path: Path) -> dict[str, Any]:
         "compression": attributes.compression,
         "parts": attributes.parts,
         "layers": [_layer(*layer, channels) for layer in exr.layers_of(channels).items()],
-        "denoiser": _use(channels, str(path)),
+        "denoiser": _use(source),
     }
 
 
@@ -76,33 +88,51 @@ def _layer(name: str, parts: list[str], channels: dict[str, np.ndarray]) -> dict
     }
 
 
-def _use(channels: dict[str, np.ndarray], source: str) -> dict[str, Any]:
+def _use(source: layouts.Source) -> dict[str, Any]:
     """What `denoise` would take, or why it cannot."""
-    counts = layouts.spp_present(channels)
+    layout = source.layout
+    use: dict[str, Any] = {"layout": layout.program, "notes": list(layout.notes)}
     try:
-        layers = layouts.assemble(channels, layouts.native(counts[0] if counts else 1), source)
+        images = layouts.assemble(source)
     except ValueError as error:
-        return {"usable": False, "why": str(error)}
-    present = [layer for layer, image in layers.items() if image is not None]
-    return {
+        return use | {"usable": False, "why": str(error)}
+    present = [layer for layer, image in images.items() if image is not None]
+    named = {n: c for n, c in layout.channels.items() if set(c) <= set(source.channels)}
+    return use | {
         "usable": True,
-        "spp": counts,
+        "spp": layouts.native.spp_present(source.channels),
+        "light": layout.light,
         "guides": [name for name in ("normal", "depth", "ao") if name in present],
         "composite": [name for name in ("albedo", "direct", "emission") if name in present],
         "reference": "reference" in present,
-        "absent": [layer for layer in layouts.COMPONENTS if layer not in present],
+        "absent": [layer for layer in layouts.LAYERS if layer not in present],
+        "channels": {layer: list(channels) for layer, channels in named.items()},
     }
 
 
 def _use_text(use: dict[str, Any]) -> list[str]:
+    notes = [f"  note         {note}" for note in use["notes"]]
     if not use["usable"]:
-        return [f"jflnr denoise cannot use it: {use['why']}"]
-    noisy = ", ".join(f"indirect_{spp} (--spp {spp})" for spp in use["spp"])
+        return [f"layout: {use['layout']}; jflnr denoise cannot use it: {use['why']}", *notes]
+    light = exr.layer_of(use["channels"][use["light"]][0]) or "plain R, G, B"
+    noisy = [f"indirect_{spp} (--spp {spp})" for spp in use["spp"]] or [light]
+    rest = "the rest of the picture" if "beauty" in use["channels"] else "emission"
+    parts = [rest if name == "emission" else name for name in use["composite"]]
     return [
-        "jflnr denoise would use",
-        f"  noisy light  {noisy}",
-        f"  guides       {', '.join(use['guides'])}",
-        f"  composite    {', '.join(['denoised indirect', *use['composite']])}",
+        f"layout: {use['layout']}; jflnr denoise would use",
+        f"  noisy light  {', '.join(noisy)}",
+        f"  guides       {', '.join(_named(name, use['channels']) for name in use['guides'])}",
+        f"  composite    {', '.join(['denoised indirect', *parts])}",
         f"  reference    {'yes (--reference)' if use['reference'] else 'none'}",
         f"  absent       {', '.join(use['absent']) or 'nothing'}",
+        *notes,
     ]
+
+
+def _named(guide: str, channels: dict[str, list[str]]) -> str:
+    """The guide, with where it comes from unless that is a layer of the same name."""
+    if guide not in channels:
+        return f"{guide} (from position)"
+    first = channels[guide][0]
+    source = exr.layer_of(first) or first
+    return guide if source == guide else f"{guide} ({source})"

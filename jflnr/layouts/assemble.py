@@ -1,0 +1,82 @@
+"""From a file's channels and its layout to the layers of a Frame."""
+
+import numpy as np
+
+from jflnr.exr import Window
+from jflnr.layouts.camera import Camera
+from jflnr.layouts.channels import LAYERS, NATIVE, layer
+from jflnr.layouts.light import DARK, demodulate, rest
+from jflnr.layouts.source import Source
+
+Layers = dict[str, np.ndarray | None]
+
+# Farther than anything: programs write 1e10 or infinity where nothing is hit.
+SKY = 1e9
+
+
+def assemble(source: Source) -> Layers:
+    """The Frame's layers as float32 (H, W, C), None for an optional one that is absent.
+
+    Depth and position come from each other where one is absent and the camera known.
+    Raises ValueError, naming the file, as `layer` does.
+    """
+    layout, channels = source.layout, source.channels
+    names = NATIVE | dict(layout.channels)
+    there = {name for name in names if any(channel in channels for channel in names[name])}
+
+    def read(name: str) -> np.ndarray:
+        return layer(channels, name, names[name], str(source.path), layout.advice.get(name, ""))
+
+    camera = Camera.of(source.attributes.others | source.header)
+    needed = {layout.light, "albedo", "normal", "depth"}
+    if camera is not None and "position" in there and "depth" not in there:
+        needed.remove("depth")
+    images: Layers = {name: read(name) for name in names if name in needed | there}
+    images = dict.fromkeys(LAYERS) | images
+    if camera is not None:
+        images |= _derived(images, camera, source.attributes.window)
+    if layout.light != "indirect" or "beauty" in layout.channels:
+        images |= _separated(images)
+    return {name: images[name] for name in LAYERS}
+
+
+def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
+    """Depth or position, if it is absent."""
+    position, depth, normal = images["position"], images["depth"], images["normal"]
+    if depth is None and position is not None and normal is not None:
+        return {"depth": camera.depth(position, (normal != 0).any(axis=-1, keepdims=True))}
+    if position is None and depth is not None and camera.fov_x is not None:
+        return {"position": camera.position(depth, window)}
+    return {}
+
+
+def _separated(images: Layers) -> Layers:
+    """The layers of another program's picture: what is denoised, and the rest of the picture.
+
+    `albedo * (direct + indirect) + emission` is the beauty again. Where there is no surface or all
+    of its albedo is at most `DARK`, the picture passes through as it is: albedo and mask are 0.
+    """
+    depth, albedo, beauty = images["depth"], images["albedo"], images.get("beauty")
+    assert depth is not None and albedo is not None
+    depth = np.where((depth > 0) & (depth < SKY), depth, 0)
+    mask, indirect = images["mask"], images["indirect"]
+    if mask is None:
+        surface = (depth > 0) & (albedo > DARK).any(axis=-1, keepdims=True)
+        mask = surface.astype(np.float32)
+    albedo = np.where(mask > 0, albedo, 0)
+    if indirect is None:
+        radiance = images.get("radiance")
+        radiance = beauty if radiance is None else radiance
+        assert radiance is not None
+        indirect = demodulate(radiance, albedo)
+    emission = images["emission"]
+    if beauty is not None:
+        direct = images["direct"]
+        emission = rest(beauty, albedo, indirect if direct is None else direct + indirect)
+    return {
+        "depth": depth,
+        "albedo": albedo,
+        "mask": mask,
+        "indirect": indirect,
+        "emission": emission,
+    }

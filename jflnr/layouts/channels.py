@@ -1,0 +1,91 @@
+"""Layers, the channels they are made of, and reading one out of the other."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from jflnr.exr import layer_of, layers_of
+
+# The layers of a Frame, with the components that our own files give them.
+LAYERS = {
+    "indirect": "RGB",
+    "albedo": "RGB",
+    "normal": "XYZ",
+    "depth": "Z",
+    "position": "XYZ",
+    "ao": "Y",
+    "mask": "Y",
+    "emission": "RGB",
+    "direct": "RGB",
+    "reference": "RGB",
+    "reference_a": "RGB",
+    "motion": "XY",
+}
+NATIVE = {layer: tuple(f"{layer}.{c}" for c in parts) for layer, parts in LAYERS.items()}
+
+# In the order of both `R G B` and `X Y Z`; `red` and the like count by their first letter.
+ORDER = "RXUGYVBZT"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a file's channels mean.
+
+    `channels` maps layers of a Frame to channel names, and two more: `beauty`, the whole picture,
+    and `radiance`, light to be denoised that is still multiplied by albedo (the beauty where there
+    is neither `radiance` nor `indirect`).
+    """
+
+    program: str
+    channels: Mapping[str, tuple[str, ...]]
+    picture: tuple[str, ...] = ()  # where the program keeps the picture: R, G, B and maybe alpha
+    notes: tuple[str, ...] = ()  # what a user should know about it
+    advice: Mapping[str, str] = field(default_factory=dict)  # how to have a missing layer written
+
+    @property
+    def light(self) -> str:
+        """The layer that is denoised: `indirect`, `radiance` or `beauty`."""
+        return next(n for n in ("indirect", "radiance", "beauty") if n in self.channels)
+
+
+def in_layer(channels: Iterable[str], layer: str) -> tuple[str, ...]:
+    """The colour or vector channels of `layer`, in order, without alpha."""
+    own = [name for name in channels if layer_of(name) == layer]
+    letters = {name: name.rpartition(".")[2][:1].upper() for name in own}
+    kept = [name for name in own if letters[name] and letters[name] in ORDER]
+    return tuple(sorted(kept, key=lambda name: ORDER.index(letters[name])))
+
+
+def layer(
+    channels: Mapping[str, np.ndarray],
+    name: str,
+    names: tuple[str, ...],
+    source: str,
+    advice: str = "",
+) -> np.ndarray:
+    """Layer `name` of a Frame, float32 (H, W, C), from the channels `names`.
+
+    Three channels make a layer of one by their mean, one makes a layer of three by repetition.
+    Raises ValueError, naming `source`, if channels are missing or no value is finite; `advice`
+    says what to do about a missing layer.
+    """
+    stem = layer_of(names[0]) or ", ".join(names)
+    missing = [channel for channel in names if channel not in channels]
+    if missing == list(names):
+        raise ValueError(f"{source}: layer {stem} is missing; {advice or present(channels)}")
+    if missing:
+        raise ValueError(f"{source}: layer {stem} lacks its channel {', '.join(missing)}")
+    image = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
+    if not np.isfinite(image).any():
+        raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
+    count = len(LAYERS.get(name, "RGB"))
+    if count == 1 < len(names):
+        return image.mean(axis=-1, keepdims=True)
+    return np.repeat(image, count, axis=-1) if len(names) == 1 < count else image
+
+
+def present(channels: Iterable[str]) -> str:
+    """What there is, for an error's reader."""
+    layers = layers_of(channels)
+    return "the file holds " + ", ".join(n or "plain " + "".join(c) for n, c in layers.items())

@@ -1,0 +1,58 @@
+"""The user's own word on which channels a layer is made of (`--map`, `read_frame(layers=...)`)."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from jflnr import checks, exr
+from jflnr.layouts.channels import LAYERS, Layout, in_layer, present
+
+FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE)
+
+
+def override(
+    layout: Layout, channels: dict[str, np.ndarray], layers: Mapping[str, str], path: Path
+) -> Layout:
+    """`layout` with `layers` made of what the user says; channels of other files are added.
+
+    A value is a layer of the file, channels with commas between them, or `FILE.exr`, seen from the
+    folder of `path`, with `:` and one of those after it; `{stem}` in it is the stem of `path`.
+    Raises ValueError if there is no such thing, and OSError as `read_channels` does.
+    """
+    names = dict(layout.channels)
+    for name, value in layers.items():
+        checks.choice("layers", name, (*LAYERS, "beauty", "radiance"))
+        names[name] = _find(channels, name, value, path)
+    if "radiance" in layers:
+        names = {n: c for n, c in names.items() if n not in ("indirect", "direct") or n in layers}
+    return replace(layout, channels=names)
+
+
+def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) -> tuple[str, ...]:
+    """The channels that `value` means; those of another file are added to `channels`."""
+    if match := FILE.fullmatch(value):
+        other = path.parent / match["file"].replace("{stem}", path.stem)
+        read = exr.read_channels(other)
+        found = _choose(read, name, match["name"] or "", str(other))
+        channels |= {f"{other}:{channel}": read[channel] for channel in found}
+        return tuple(f"{other}:{channel}" for channel in found)
+    return _choose(channels, name, value, str(path))
+
+
+def _choose(
+    channels: Mapping[str, np.ndarray], name: str, value: str, source: str
+) -> tuple[str, ...]:
+    listed = tuple(channel.strip() for channel in value.split(","))
+    found = listed if set(listed) <= set(channels) else in_layer(channels, value)
+    count = len(LAYERS.get(name, "RGB"))
+    if not found:
+        what = value or "a plain channel"
+        raise ValueError(f"{source}: there is no {what} for {name}; {present(channels)}")
+    if len(found) not in (1, count) and count != 1:
+        raise ValueError(
+            f"{source}: {name} is made of 1 or {count} channels, and {value} has {len(found)}"
+        )
+    return found

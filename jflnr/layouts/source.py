@@ -1,0 +1,62 @@
+"""A file, and what its channels mean."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jflnr import exr
+from jflnr.layouts import blender, common, mitsuba, native, pbrt
+from jflnr.layouts.channels import Layout
+from jflnr.layouts.override import override
+
+
+@dataclass(frozen=True)
+class Source:
+    """What `load` found: every channel (H, W) in its own type, the header, and the layout."""
+
+    path: Path
+    channels: dict[str, np.ndarray]
+    attributes: exr.Attributes
+    layout: Layout
+
+    @property
+    def header(self) -> dict:
+        """The JSON object in the header's `comments`; {} if there is none."""
+        return parse_header(self.attributes.comments)
+
+
+def load(
+    path: exr.PathLike, spp: int | None = None, layers: Mapping[str, str] | None = None
+) -> Source:
+    """Read the file at `path` and see which layout it is in.
+
+    spp: which noisy layer of a native file; by default the one of fewest samples. layers: as for
+    `read_frame`. Raises OSError and ValueError as `read_frame` does.
+    """
+    path, attributes, channels = Path(path), exr.read_attributes(path), exr.read_channels(path)
+    layout = recognise(channels, spp)
+    if layers:
+        layout = override(layout, channels, layers, path)
+    return Source(path, channels, attributes, layout)
+
+
+def recognise(channels: Mapping[str, np.ndarray], spp: int | None = None) -> Layout:
+    """The layout that the names of `channels` are in; the native one if they are in no other."""
+    counts = native.spp_present(channels)
+    if not counts:
+        for program in (blender, pbrt, mitsuba, common):
+            if (found := program.layout(channels)) is not None:
+                return found
+    return native.layout(spp or (counts or [1])[0], counts)
+
+
+def parse_header(comments: str) -> dict:
+    """The JSON object in `comments`; {} if there is none."""
+    try:
+        header = json.loads(comments)
+    except json.JSONDecodeError:
+        return {}
+    return header if isinstance(header, dict) else {}
