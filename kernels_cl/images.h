@@ -116,7 +116,7 @@ INLINE real read_guide(GUIDE_PARAMETERS, int q, long pixel, int first, int last)
 
 // A guide as the moments and the model take it: its distance from the shift, cut so that the sum
 // of squares stays a float.
-#define FARTHEST 1e17f
+#define FARTHEST 1e16f
 INLINE real from_shift(real x, float shift)
 {
     x -= shift;

@@ -6,25 +6,12 @@
 // is not finite is left out, and so is one whose weight is not above 0. Blocks may hang over the
 // border; moments[0] then says how much of the block there was.
 //
-// Defines beside those of the headers: BLOCK, side of a block in pixels; WEIGHTED, if there is an
-// image of weights.
+// Defines: those of the headers.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "images.h"
-
-#if !defined(BLOCK) || BLOCK < 1
-#error "BLOCK, the side of a block in pixels, must be at least 1"
-#endif
-
-#ifdef MASKED
-typedef uchar weight_t;
-#define WEIGHT_AT(i) (weight[pixel + MIN(i, last)] ? 1.0f : 0.0f)
-#else
-typedef float weight_t;
-#define WEIGHT_AT(i) weight[pixel + MIN(i, last)]
-#endif
-#define INSIDE(i) ((i) <= last ? 1.0f : 0.0f)
+#include "products.h"
 
 // One work-item per block: global size (pitch, h). Every pixel is read once.
 kernel void moments(
@@ -40,64 +27,27 @@ kernel void moments(
 
     const int top = by * BLOCK, bottom = MIN(top + BLOCK, height);
     const int left = bx * BLOCK, right = MIN(left + BLOCK, width);
-    for (int y = top; y < bottom; ++y) {
+    for (int row = top; row < bottom; ++row) {
         for (int x0 = left; x0 < left + BLOCK; x0 += WIDTH) {
-            const long pixel = (long)y * width + x0;
-            real one, x[Q + 1], y_[C];
-            if (x0 + WIDTH <= right) {
-                one = 1;
-                EXPECT(target, (pixel + AHEAD) * C);
+            const long pixel = (long)row * width + x0;
+            const int last = MIN(right - x0, WIDTH) - 1;
+            real x[Q + 1], y[C];
+            if (last == WIDTH - 1) {
+                EXPECT(target, (pixel + AHEAD) * TARGETS);
                 EXPECT(guides_0, (pixel + AHEAD) * PART_0);
                 EXPECT(guides_1, (pixel + AHEAD) * PART_1);
                 EXPECT(guides_2, (pixel + AHEAD) * PART_2);
-#pragma unroll
-                for (int q = 0; q < Q; ++q) x[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, WIDTH - 1);
-#pragma unroll
-                for (int c = 0; c < C; ++c)
-                    y_[c] = target_lanes(target + pixel * C, C, c, 0, WIDTH - 1);
+                read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
             } else {
-                const int last = right - 1 - x0;
-                one = LANES(real, INSIDE);
-#pragma unroll
-                for (int q = 0; q < Q; ++q) x[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, last);
-#pragma unroll
-                for (int c = 0; c < C; ++c) y_[c] = target_lanes(target + pixel * C, C, c, 0, last);
+                read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
             }
-            real zero = 0;  // stays 0 unless a value is not finite: 0 Inf and 0 NaN are NaN
-#pragma unroll
-            for (int q = 0; q < Q; ++q) zero += 0 * x[q];
-#pragma unroll
-            for (int c = 0; c < C; ++c) zero += 0 * y_[c];
-#ifdef WEIGHTED
-            const int last = MIN(right - x0, WIDTH) - 1;
-            const real w = LANES(real, WEIGHT_AT);
-            zero += 0 * w;
-            one = w > 0 ? w * one : (real)0;
-#endif
-            one = zero == 0 ? one : (real)0;
+            const real one = usable(weight, pixel, last, x, y);
 #pragma unroll
             for (int q = 0; q < Q; ++q) x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
             // Divided before they are summed: radiance near the largest float must not overflow.
 #pragma unroll
-            for (int c = 0; c < C; ++c) y_[c] = one > 0 ? y_[c] * (1.0f / (BLOCK * BLOCK)) : (real)0;
-
-#ifdef WEIGHTED
-#define WEIGHTED_BY_ONE(v) (one * (v))
-#else
-#define WEIGHTED_BY_ONE(v) (v)
-#endif
-            sums[0] += one;
-#pragma unroll
-            for (int c = 0; c < C; ++c) sums[XY(0, c)] += WEIGHTED_BY_ONE(y_[c]);
-#pragma unroll
-            for (int i = 0; i < Q; ++i) {
-                const real u = WEIGHTED_BY_ONE(x[i]);
-                sums[XX(i + 1, 0)] += u;
-#pragma unroll
-                for (int j = 0; j <= i; ++j) sums[XX(i + 1, j + 1)] += u * x[j];
-#pragma unroll
-                for (int c = 0; c < C; ++c) sums[XY(i + 1, c)] += u * y_[c];
-            }
+            for (int c = 0; c < C; ++c) y[c] = one > 0 ? y[c] * (1.0f / (BLOCK * BLOCK)) : (real)0;
+            add_products(sums, one, x, y);
         }
     }
 #pragma unroll
