@@ -17,6 +17,7 @@ from jflnr import checks
 from jflnr import guides as guide_layers
 from jflnr.flr.adaptive import flr_adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
+from jflnr.flr.arguments import times_finer
 from jflnr.flr.noisy_guides import smooth_guide
 from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.regression import flr
@@ -110,8 +111,7 @@ def _check_sizes(frame: Frame) -> None:
     checks.same_size(**layers)
     checks.image("indirect", frame.indirect)
     (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]
-    factor = -(-height // h)
-    if (-(-height // factor), -(-width // factor)) != (h, w):
+    if times_finer((height, width), (h, w)) is None:
         raise ValueError(
             f"frame.indirect is {w} x {h} pixels and the guides are {width} x {height}; "
             "they must be the same, or the guides a whole number of times larger"
@@ -131,15 +131,21 @@ def _support(parameters: Parameters, longest: int) -> int:
 
 def _coarse_block(frame: Frame, block: int) -> int:
     """The block in pixels of `frame.indirect`, which may be coarser than the guides."""
-    factor = -(-frame.normal.shape[0] // frame.indirect.shape[0])
-    return max(block // factor, 1)
+    return max(block // _factor(frame), 1)
 
 
-def _images(frame: Frame, names: tuple[str, ...]) -> dict[str, Any]:
+def _factor(frame: Frame) -> int:
+    """How many times larger the guides are than the light."""
+    return times_finer(frame.normal.shape[:2], frame.indirect.shape[:2]) or 1
+
+
+def _images(
+    frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene | None = None
+) -> dict[str, Any]:
     """The images that `flr` takes, from the layers of the frame; numpy's stay where they are."""
     target, mask = frame.indirect, frame.mask
-    layers = guide_layers.layers(frame, names)
-    factor = -(-frame.normal.shape[0] // target.shape[0])
+    layers = guide_layers.layers(frame, names, scene)
+    factor = _factor(frame)
     if factor == 1:
         weight = None if mask is None else mask[..., 0] > 0
         return {"target": target, "guides": layers, "weight": weight}

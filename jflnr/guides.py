@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -32,31 +32,55 @@ def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(names)
 
 
+class Scene(NamedTuple):
+    """What the whole frame says of its scene, `()` and `(3,)`, so that parts of it agree.
+
+    depth: median depth of the surfaces. middle: a point among them; zeros without positions.
+    """
+
+    depth: jax.Array
+    middle: jax.Array
+
+
+def scene_of(frame: Frame) -> Scene:
+    """The typical depth and the middle of a frame."""
+    height, width = frame.depth.shape[:2]
+    step = depth_step(height, width)
+    mask = None if frame.mask is None else frame.mask[::step, ::step]
+    middle = jnp.zeros(3) if frame.position is None else frame.position[height // 2, width // 2]
+    return Scene(typical_depth(frame.depth[::step, ::step], mask), jnp.nan_to_num(middle))
+
+
+def depth_step(height: int, width: int) -> int:
+    """Pixels from one to the next of a regular grid of about 16 000 pixels."""
+    return max(round((height * width / 16384) ** 0.5), 1)
+
+
 def typical_depth(depth: Array, mask: Array | None) -> jax.Array:
-    """Median depth of the surfaces, from a regular grid of at most about 16 000 pixels; 1 if none.
+    """Median depth of the surfaces; 1 if there are none.
 
     depth: `(H, W, 1)` in scene units. mask: `(H, W, 1)` or None. Returns a scalar.
     """
-    step = max(round((depth.shape[0] * depth.shape[1] / 16384) ** 0.5), 1)
-    sample = jnp.asarray(depth[::step, ::step, 0], jnp.float32)
-    surface = sample > 0 if mask is None else jnp.asarray(mask[::step, ::step, 0]) > 0
+    sample = jnp.asarray(depth, jnp.float32)
+    surface = sample > 0 if mask is None else jnp.asarray(mask) > 0
     median = jnp.nanmedian(jnp.where(surface & jnp.isfinite(sample), sample, jnp.nan))
     return jnp.where(median > 0, median, 1)
 
 
-def layers(frame: Frame, names: Sequence[str]) -> tuple[Any, ...]:
+def layers(frame: Frame, names: Sequence[str], scene: Scene | None = None) -> tuple[Any, ...]:
     """The guides as separate layers `(H, W, C)`, free of the scene's unit of length.
 
     Depth is divided by its median over the mask; so is the position, about a point of the scene.
+    scene: of the frame that this one is a part of; the frame's own if None.
     """
-    scale = 1 / typical_depth(frame.depth, frame.mask)
+    scene = scene_of(frame) if scene is None else scene
+    scale = 1 / scene.depth
     chosen = {name: getattr(frame, name) for name in names}
     if "depth" in chosen:
         chosen["depth"] = chosen["depth"] * scale
     if "position" in chosen:
         # Regularisation grows with a guide's distance from zero, and the origin means nothing.
-        middle = chosen["position"][frame.depth.shape[0] // 2, frame.depth.shape[1] // 2]
-        chosen["position"] = (chosen["position"] - jnp.nan_to_num(middle)) * scale
+        chosen["position"] = (chosen["position"] - scene.middle) * scale
     return tuple(chosen[name] for name in names)
 
 

@@ -49,13 +49,25 @@ def _finer_by(target: Any, guides: Any, guides_map: Any) -> int:
             f"got {[layer.shape for layer in jax.tree.leaves(guides_map)]}"
         )
     height, width = fine.pop()
-    factor = -(-height // coarse[0])
-    if (-(-height // factor), -(-width // factor)) != coarse:
+    factor = times_finer((height, width), coarse)
+    if factor is None:
         raise ValueError(
             f"guides_map must be a whole number of times larger than guides; got {width} x "
             f"{height} against {coarse[1]} x {coarse[0]} pixels"
         )
     return factor
+
+
+def times_finer(fine: tuple[int, int], coarse: tuple[int, int]) -> int | None:
+    """The smallest f with `coarse = ceil(fine / f)` in both directions; None if there is none."""
+    first = max(-(-f // c) for f, c in zip(fine, coarse, strict=True))
+    for factor in range(first, max(fine) + 1):
+        rows, columns = (-(-size // factor) for size in fine)
+        if (rows, columns) == coarse:
+            return factor
+        if rows < coarse[0] or columns < coarse[1]:
+            break
+    return None
 
 
 def channel_count(images: Any) -> int:

@@ -22,16 +22,31 @@ def restore(
     coefficients: `(Q + 1, C, h, w)`. moments: unweighted, of the brightness alone, at half the
     resolution. slack: a share, such as 0.025. Returns scaled coefficients.
     """
+    output = block_light(coefficients, moments, guides)
+    wanted = jnp.sum(moments[index_xy(0, 0, guides, 1)])
+    sums = jnp.sum(moments[0] * output), jnp.sum(moments[0] * output**2)
+    return scale(coefficients, output, rate(wanted, *sums, slack))
+
+
+def block_light(coefficients: jax.Array, moments: jax.Array, guides: int) -> jax.Array:
+    """Brightness that the models give each block of `moments`, `(h, w)`; arguments of `restore`."""
     whole = halve(jnp.ones((1, *coefficients.shape[2:]), coefficients.dtype))
     pooled = halve(coefficients.reshape(-1, *coefficients.shape[2:])) / whole
     pooled = pooled.reshape(*coefficients.shape[:2], *whole.shape[1:])
-    n = moments[0]
-    output = jnp.maximum(predict(pooled, mean_guides(moments, guides)), 0)
-    before = jnp.sum(n * output)
-    wanted = jnp.sum(moments[index_xy(0, 0, guides, 1)])
+    return jnp.maximum(predict(pooled, mean_guides(moments, guides)), 0)
+
+
+def rate(
+    wanted: jax.Array, before: jax.Array, squares: jax.Array, slack: jax.Array | float
+) -> jax.Array:
+    """How much of the squared brightness is added: from sums over the frame of the input's
+    brightness, of the output's and of its square."""
     wanted = jnp.clip(before, (1 - slack) * wanted, (1 + slack) * wanted)
-    squares = jnp.sum(n * output**2)
-    rate = (wanted - before) / jnp.where(squares > 0, squares, 1)
+    return (wanted - before) / jnp.where(squares > 0, squares, 1)
+
+
+def scale(coefficients: jax.Array, output: jax.Array, rate: jax.Array) -> jax.Array:
+    """Add `rate` times the square of the brightness. output: `(h, w)`, from `block_light`."""
     factor = jnp.maximum(1 + rate * output, 0)
     factor = jnp.repeat(jnp.repeat(factor, 2, axis=0), 2, axis=1)
     return coefficients * factor[: coefficients.shape[2], : coefficients.shape[3]]
