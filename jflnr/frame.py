@@ -50,7 +50,6 @@ def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | Non
     Raises OSError for a file that cannot be opened, and ValueError, in one sentence, for one that
     is not a usable frame.
     """
-    checks.positive_integer("spp", spp)
     return frame_of(layouts.load(path, spp, layers))
 
 

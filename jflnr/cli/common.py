@@ -3,12 +3,14 @@
 import argparse
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TextIO
 
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
 INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
 
+COLOURS = {"red": 31, "yellow": 33}
 LABELS = {
     "psnr": "PSNR dB",
     "ssim": "SSIM",
@@ -25,6 +27,14 @@ def sentence(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def tinted(text: str, colour: str, stream: TextIO) -> str:
+    """`text` in `colour` if `stream` is a terminal that shows colours (https://no-color.org)."""
+    plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
+    if plain or not stream.isatty():
+        return text
+    return f"\033[{COLOURS[colour]}m{text}\033[0m"
 
 
 def add_map(parser: argparse.ArgumentParser) -> None:

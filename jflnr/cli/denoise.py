@@ -1,7 +1,8 @@
 """denoise: denoise frames, and write the light and the picture as EXR.
 
-Each output holds the layer `indirect` (denoised, demodulated) and the picture
-albedo * (direct + indirect) + emission as plain R, G, B, all float.
+Frames of Blender (Cycles), Mitsuba 3 and pbrt-v4 are read as they are; `jflnr info` says how.
+Each output holds the picture, put together again with the denoised light, as plain R, G, B (and A
+where the input has it), and that light, demodulated, as the layer `indirect`.
 
 OUT is a file when IN is one file and OUT ends with .exr; otherwise it is a folder, and each output
 has its input's name. An output that exists is kept, which is no error, unless --overwrite is given.
@@ -19,18 +20,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jflnr.cli.common import (
-    INPUT_ERRORS,
-    guide_names,
-    metrics_table,
-    profile_table,
-    sentence,
-    to_json,
-)
+from jflnr import layouts
+from jflnr.cli.common import INPUT_ERRORS, add_map, guide_names, sentence, to_json
 from jflnr.cli.jobs import Job, make_folder, plan
+from jflnr.cli.summary import remarks, summary
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
+
+
+EXAMPLES = """\
+  jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
+  jflnr denoise render.exr -o out/ --direct --png --method flr-adaptive
+  jflnr denoise shot/ -o clean/ --keep-channels every pass of the input, the picture clean
+  jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
+  jflnr denoise room.exr -o out/ --reference    metrics before and after
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,6 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("inputs", metavar="IN", nargs="+", type=Path, help="EXR frames, or folders of them")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="file or folder to write")
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
+    add_map(parser)
+    add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
     add("--method", default="flr", help="flr or flr-adaptive (flr)")
     add("--backend", default="jax", help="what runs it: jax or opencl (jax)")
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
@@ -47,10 +54,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--eps-prime", type=float, help="additive regularisation")
     add("--block", type=int, help="side of the squares of pixels that share one model")
     add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
+    add("--keep-channels", action="store_true", help="write the input's other channels too")
     add("--reference", action="store_true", help="print metrics against the layer `reference`")
     add("--overwrite", action="store_true", help="replace outputs that exist")
     add("--json", action="store_true", help="print one JSON list instead of lines")
     add("--profile", action="store_true", help="print the time of every OpenCL kernel")
+    level = parser.add_mutually_exclusive_group()
+    level.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    level.add_argument(
+        "-v", "--verbose", action="store_true", help="say what each file was read as"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -60,13 +73,13 @@ def run(arguments: argparse.Namespace) -> int:
     settings = _settings(arguments)
     records = []
     compiled: set[tuple] = set()
-    with tqdm(jobs, unit="frame", disable=None, leave=False) as bar:
+    with tqdm(jobs, unit="frame", disable=arguments.quiet or None, leave=False) as bar:
         for job in bar:
             records.append(record := _attempt(job, settings, arguments, compiled))
-            for line in _remarks(record):
+            for line in remarks(record, arguments.quiet):
                 bar.write(line, file=sys.stderr)
-            if not arguments.json and "error" not in record:
-                bar.write(_summary(record))
+            if not arguments.json and not arguments.quiet and "error" not in record:
+                bar.write(summary(record, arguments.verbose))
     if arguments.json:
         print(to_json(records))
     return 2 if any("error" in record for record in records) else 0
@@ -153,27 +166,34 @@ def _denoise(
 ) -> dict[str, Any]:
     """Read, denoise, write; `compiled` are the shapes there is a program for, and is added to."""
     from jflnr.denoising import denoise
-    from jflnr.frame import read_frame
+    from jflnr.frame import frame_of
     from jflnr.metrics import measure
 
-    frame = read_frame(job.source, arguments.spp)
+    source = layouts.load(job.source, arguments.spp, dict(arguments.map))
+    frame = frame_of(source)
+    noisy = _with_direct(frame, job.source) if arguments.direct else frame
     if arguments.reference and frame.reference is None:
         raise ValueError(f"{job.source}: --reference needs a layer reference, and there is none")
     make_folder(job.target)
-    shapes = tuple(getattr(image, "shape", None) for image in vars(frame).values())
+    shapes = tuple(getattr(image, "shape", None) for image in vars(noisy).values())
     times = [time.perf_counter()]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         # The first frame of a kind is denoised twice, to tell compiling from denoising.
         for _ in range(1 if shapes in compiled else 2):
-            indirect = np.asarray(denoise(frame, **settings), np.float32)
+            light = np.asarray(denoise(noisy, **settings), np.float32)
             times.append(time.perf_counter())
     compiled.add(shapes)
-    about = _about(frame, settings, arguments.spp)
-    _write(job, frame, indirect, about, png=arguments.png)
+    spp = arguments.spp if layouts.native.spp_present(source.channels) else None
+    about = _about(frame, settings, spp)
+    indirect, *direct = np.split(light, light.shape[-1] // 3, axis=-1)
+    lights = {"indirect": indirect} | ({"direct": direct[0]} if direct else {})
+    _write(job, source, frame, lights, about, arguments)
     record = {
         "width": indirect.shape[1],
         "height": indirect.shape[0],
+        "layout": source.layout.program,
+        "notes": list(source.layout.notes),
         **about,
         "seconds": times[-1] - times[-2],
         "compile_seconds": times[-2] - times[0],
@@ -183,35 +203,50 @@ def _denoise(
         from jflnr.opencl.context import default_context
         from jflnr.opencl.profile import profile
 
-        rows = profile(default_context(), lambda: denoise(frame, **settings))
+        rows = profile(default_context(), lambda: denoise(noisy, **settings))
         record["profile"] = [row._asdict() for row in rows]
     if arguments.reference:
-        noisy, denoised = measure(frame, frame.indirect), measure(frame, indirect)
-        record["metrics"] = {"noisy": noisy, "denoised": denoised}
+        images = {"noisy": frame.indirect, "denoised": indirect}
+        record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
     return record
 
 
+def _with_direct(frame: "Frame", path: Path) -> "Frame":
+    """The frame whose light to denoise, (H, W, 6), is the indirect and the direct one."""
+    if frame.direct is None:
+        raise ValueError(f"{path}: --direct needs a layer of direct light, and there is none")
+    light = np.concatenate([frame.indirect, frame.direct], axis=-1)
+    return dataclasses.replace(frame, indirect=light)
+
+
 def _write(
-    job: Job, frame: "Frame", indirect: np.ndarray, about: dict[str, Any], png: bool
+    job: Job,
+    source: layouts.Source,
+    frame: "Frame",
+    lights: dict[str, np.ndarray],
+    about: dict[str, Any],
+    arguments: argparse.Namespace,
 ) -> None:
     """Write the preview, if asked for, and the EXR, with the input's header and windows."""
     from jflnr import exr
     from jflnr.cli.preview import write_preview
-    from jflnr.frame import composite, read_header
+    from jflnr.frame import composite
     from jflnr.metrics import exposure
 
-    picture = np.asarray(composite(frame, indirect), np.float32)
-    if png:
+    frame = dataclasses.replace(frame, direct=lights.get("direct", frame.direct))
+    picture = np.asarray(composite(frame, lights["indirect"]), np.float32)
+    if arguments.png:
         # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        lit = composite(dataclasses.replace(frame, emission=None), indirect)
+        lit = composite(dataclasses.replace(frame, emission=None), lights["indirect"])
         write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
-    channels = {f"indirect.{c}": indirect[..., i] for i, c in enumerate("RGB")}
-    channels |= {c: picture[..., i] for i, c in enumerate("RGB")}
-    comments = json.dumps(read_header(job.source) | {"denoiser": about})
-    exr.write_channels(job.target, channels, comments, exr.read_attributes(job.source).window)
+    mask = None if frame.mask is None else np.asarray(frame.mask)
+    channels = layouts.output_channels(source, picture, lights, mask, arguments.keep_channels)
+    comments = json.dumps(source.header | {"denoiser": about})
+    attributes = source.attributes
+    exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
 
 
-def _about(frame: "Frame", settings: dict[str, Any], spp: int) -> dict[str, Any]:
+def _about(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[str, Any]:
     """What was done, for the record and for the header of the output."""
     from jflnr.guides import choose
 
@@ -234,28 +269,3 @@ def _not_finite(frame: "Frame") -> list[str]:
         return []
     listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
     return [f"pixels that are NaN or infinite (the fit leaves them out): {listed}"]
-
-
-def _remarks(record: dict[str, Any]) -> list[str]:
-    """Lines for stderr."""
-    lines = [f"jflnr: warning: {record['input']}: {text}" for text in record.get("warnings", ())]
-    if "error" in record:
-        lines.append(f"jflnr: {record['error']}")
-    return lines
-
-
-def _summary(record: dict[str, Any]) -> str:
-    """Lines for stdout."""
-    if record["status"] == "kept":
-        return f"{' and '.join(record['kept'])} kept as it is; --overwrite replaces it"
-    text = (
-        f"{record['input']} -> {record['output']}  {record['width']} x {record['height']}, "
-        f"{record['spp']} spp, {record['method']}, {record['seconds']:.2f} s"
-    )
-    if record["compile_seconds"]:
-        text += f" (and {record['compile_seconds']:.1f} s to compile)"
-    if "metrics" in record:
-        text += "\n" + metrics_table(record["metrics"])
-    if "profile" in record:
-        text += "\n" + profile_table(record["profile"])
-    return text

@@ -7,6 +7,17 @@ a Frame, so that nothing behind this package knows where a frame came from (docs
 from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
 from jflnr.layouts.channels import LAYERS, Layout, layer
+from jflnr.layouts.output import output_channels
 from jflnr.layouts.source import Source, load, parse_header
 
-__all__ = ["LAYERS", "Layout", "Source", "assemble", "layer", "load", "native", "parse_header"]
+__all__ = [
+    "LAYERS",
+    "Layout",
+    "Source",
+    "assemble",
+    "layer",
+    "load",
+    "native",
+    "output_channels",
+    "parse_header",
+]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jflnr import exr
+from jflnr import checks, exr
 from jflnr.layouts import blender, common, mitsuba, native, pbrt
 from jflnr.layouts.channels import Layout
 from jflnr.layouts.override import override
@@ -36,6 +36,8 @@ def load(
     spp: which noisy layer of a native file; by default the one of fewest samples. layers: as for
     `read_frame`. Raises OSError and ValueError as `read_frame` does.
     """
+    if spp is not None:
+        checks.positive_integer("spp", spp)
     path, attributes, channels = Path(path), exr.read_attributes(path), exr.read_channels(path)
     layout = recognise(channels, spp)
     if layers:

@@ -1,0 +1,43 @@
+"""The channels of a denoised file, in the terms of the file it came from."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from jflnr.layouts.source import Source
+
+
+def output_channels(
+    source: Source,
+    picture: np.ndarray,
+    lights: Mapping[str, np.ndarray],
+    mask: np.ndarray | None = None,
+    keep: bool = False,
+) -> dict[str, np.ndarray]:
+    """What to write: the picture as `R`, `G`, `B`, with its alpha, and `lights` as layers.
+
+    picture: (H, W, 3). lights: denoised light (H, W, 3) by layer, `indirect` and maybe `direct`.
+    keep: also every channel of the source. Of another program's file, the picture and, where
+    `mask` (H, W, 1) is 1, the light passes are replaced by the denoised ones: the file can then
+    stand in for the source, and its passes still sum to its picture.
+    """
+    layout = source.layout
+    channels: dict[str, np.ndarray] = {}
+    if keep:
+        channels |= {name: pixels for name, pixels in source.channels.items() if ":" not in name}
+        channels |= _planes(layout.picture[:3], picture)
+    if keep and layout.picture:
+        surface = True if mask is None else mask[..., 0] > 0
+        for layer, light in lights.items():
+            for name, plane in _planes(layout.channels.get(layer, ()), light).items():
+                channels[name] = np.where(surface, plane, source.channels[name])
+    for layer, light in lights.items():
+        channels |= _planes(tuple(f"{layer}.{c}" for c in "RGB"), light)
+    channels |= _planes(("R", "G", "B"), picture)
+    for alpha in layout.picture[3:]:
+        channels["A"] = source.channels[alpha]
+    return channels
+
+
+def _planes(names: tuple[str, ...], image: np.ndarray) -> dict[str, np.ndarray]:
+    return {name: image[..., i] for i, name in enumerate(names)}
