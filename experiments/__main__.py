@@ -43,6 +43,8 @@ def main(argv: list[str]) -> int:
                 results.draw(_module(name), arguments.out, arguments.docs)
             elif (arguments.out / f"{name}.json").exists():
                 results.draw(_module(name), arguments.out, arguments.docs)
+        if arguments.command == "report":
+            importlib.import_module("experiments.report").write(arguments.out, NAMES)
     except (OSError, ValueError) as error:
         print(f"experiments: {error}", file=sys.stderr)
         return 2
@@ -64,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="run experiments by name, or all")
     run.add_argument("names", nargs="+", metavar="NAME")
     run.add_argument("--quick", action="store_true", help="a small version, in under a minute")
-    report = commands.add_parser("report", help="draw charts and tables from results on disk")
+    report = commands.add_parser("report", help="charts, tables, OUT/report.html from results")
     for command in (run, report):
         command.add_argument("--out", type=Path, default=Path("out"), help="folder of results")
         command.add_argument("--docs", type=Path, help="where charts and tables go (default: OUT)")

@@ -32,7 +32,7 @@ def write_report(
 ) -> None:
     """Write one HTML file that needs no other, atomically.
 
-    tables: more tables, each `{"title", "note", "columns": {key: heading}, "rows": [{key: value}]}`.
+    tables: more tables, each `{"title", "note", "columns": {key: heading}, "rows": [{...}]}`.
     chart: `{"title", "x": key, "rows": [{"method", "family", key: number, ...}]}`, drawn against
     any metric that the rows have.
     """
@@ -103,7 +103,7 @@ def _flip(scene: Scene, name: str) -> np.ndarray | None:
 
 
 def _layers(frame: Frame, unit: float) -> dict[str, str]:
-    """What puts the picture together around the indirect light; a layer that is absent is left out."""
+    """What puts the picture together around the indirect light, as far as it is there."""
     found = {"albedo": pack(np.asarray(frame.albedo))}
     for name, image in (("direct", frame.direct), ("emission", frame.emission)):
         if image is not None:

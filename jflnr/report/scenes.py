@@ -104,23 +104,25 @@ def _owner(path: Path, frames: Sequence[Path]) -> Path:
 
 def _names(paths: Sequence[Path], frame: str | None = None) -> dict[Path, str]:
     """The shortest names: the file's, or its folder's where it is named like its frame."""
-    for name in (
-        lambda path: path.parent.resolve().name if path.stem == frame else path.stem,
-        lambda path: path.parent.resolve().name,
-        lambda path: f"{path.parent.resolve().name}/{path.stem}",
-        str,
+    folder = {path: path.parent.resolve().name for path in paths}
+    for names in (
+        {path: folder[path] if path.stem == frame else path.stem for path in paths},
+        folder,
+        {path: f"{folder[path]}/{path.stem}" for path in paths},
     ):
-        names = {path: name(path) for path in paths}
-        if len({NOISY, REFERENCE, "", *names.values()}) == len(names) + 3:
+        if len({NOISY, REFERENCE, *names.values()}) == len(names) + 2:
             return names
-    raise ValueError(f"{paths[0]}: this file is given twice, or called {NOISY} or {REFERENCE}")
+    return {path: str(path) for path in paths}
+
+
+def _colours(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
+    return layouts.layer(channels, "picture", tuple("RGB"), str(path))
 
 
 def _light(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
-    names = tuple(f"indirect.{c}" for c in "RGB")
     if "indirect.R" not in channels:
         raise ValueError(
             f"{path} holds no layer indirect, so that it cannot be compared with a frame; "
             "leave the frame out to compare plain pictures"
         )
-    return layouts.layer(channels, "indirect", names, str(path))
+    return layouts.layer(channels, "indirect", tuple(f"indirect.{c}" for c in "RGB"), str(path))

@@ -44,9 +44,9 @@ const SHORTCUTS = [
 const ACTIONS = Object.assign({}, ...SHORTCUTS.map((shortcut) => shortcut.keys ?? {}));
 
 function onKey(event) {
-  // Fields keep their keys; so does the browser, which has its own with Ctrl, Alt and Meta.
+  // The browser has its own keys with Ctrl, Alt and Meta; fields keep arrows, Home, Enter ...
   if (event.ctrlKey || event.altKey || event.metaKey || $("help").open) return;
-  if (event.target.matches("select, input")) return;
+  if (event.target.matches("select, input") && event.key.length > 1) return;
   const arrow = /^Arrow(Left|Right)$/.exec(event.key);
   const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code);
   if (event.target === $("divider") && arrow)

@@ -157,4 +157,6 @@ function listenToPointers() {
     if (divider.hasPointerCapture(event.pointerId))
       setSplit(place(event)[0] / canvas.clientWidth);
   });
+  // After dragging, the arrows flip images again; who came by Tab moves the line with them.
+  divider.addEventListener("pointerup", () => divider.blur());
 }
