@@ -61,11 +61,11 @@ function buildMetrics() {
   $("metrics").append(sortable(columns, rows, link));
 }
 
-/** Tables that came with the page. */
+/** Tables that came with the page; short ones are open. */
 function buildTables() {
-  for (const { title, note, columns, rows } of CONTENT.tables)
-    $("tables").append(element("h2", {}, title), element("p", { className: "hint" }, note),
-      sortable(columns, rows));
+  $("tables").append(...CONTENT.tables.map(({ title, note, columns, rows }) =>
+    element("details", { open: rows.length <= 25 }, element("summary", {}, title),
+      element("p", { className: "hint" }, note), sortable(columns, rows))));
 }
 
 // Okabe and Ito's colours on a dark ground, told apart also by those who do not see red or green.

@@ -1,0 +1,65 @@
+"""The C example of docs/opencl_engine.md, compiled and run against PoCL, is FLR as in JAX."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jflnr.flr.parameters import DEFAULT
+from jflnr.flr.regression import flr
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """The command that runs the compiled example."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    libraries = Path(pytest.importorskip("pyopencl").__file__).parent / ".libs"
+    loader = next(libraries.glob("libOpenCL*"), None)
+    if loader is None or not (libraries / "pocl.icd").exists():
+        pytest.skip(f"no OpenCL loader and PoCL of their wheels in {libraries}")
+    program = tmp_path_factory.mktemp("host") / "host"
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-Wl,-rpath,{libraries}"]
+    source = str(ROOT / "docs" / "examples" / "host.c")
+    if subprocess.run([compiler, "-E", source], capture_output=True, check=False).returncode:
+        pytest.skip("the OpenCL headers are not installed (Debian: opencl-c-headers)")
+    command = [compiler, *flags, source, str(loader), "-lm", "-o", str(program)]
+    subprocess.run(command, check=True)
+    found = [f"OCL_ICD_VENDORS={libraries}{os.sep}", f"LD_LIBRARY_PATH={libraries}"]
+    return ["env", *found, str(program), str(ROOT / "kernels_cl")]
+
+
+def test_c_host_computes_what_jax_does(host: list[str], tmp_path: Path) -> None:
+    """Odd sizes, several work-items per row; float32 on both sides, so 1e-5 of the largest."""
+    rng, height, width = np.random.default_rng(0), 70, 101
+    y, x = np.mgrid[:height, :width][..., None] / 40
+    guides = np.concatenate([np.sin(x), np.cos(y), x * y, x + 2, np.sin(3 * x + y)], axis=-1)
+    light = (1 + guides[..., :3] ** 2) * rng.exponential(size=(height, width, 3))
+    light, guides = light.astype(np.float32), guides.astype(np.float32)
+    for name, image in (("light", light), ("guides", guides)):
+        image.tofile(tmp_path / f"{name}.raw")
+    files = [str(tmp_path / f"{name}.raw") for name in ("light", "guides", "denoised")]
+    subprocess.run([*host, str(width), str(height), *files], check=True)
+    found = np.fromfile(files[2], np.float32).reshape(light.shape)
+    expected = np.asarray(flr(light, guides, DEFAULT))
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_c_host_says_what_is_wrong(host: list[str], tmp_path: Path) -> None:
+    done = subprocess.run([*host], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("use: host KERNELS_CL")
+    short = tmp_path / "short.raw"
+    short.write_bytes(b"1234")
+    done = subprocess.run(
+        [*host, "8", "8", str(short), str(short), "out.raw"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1 and "does not hold 192 floats" in done.stderr
