@@ -167,7 +167,10 @@ def fit_pyramid(
     coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
     merged = coarse.coefficients
     for grid in reversed(grids[:-1]):
-        coarse, merged = _refine(grid, coarse, merged, shift, channels, mean, numbers)
+        # Windows of the finest blocks are so narrow that slopes across them are hardly worth
+        # their time.
+        slopes = grid is not grids[0]
+        coarse, merged = _refine(grid, coarse, merged, shift, channels, mean, numbers, slopes)
     return merged
 
 
@@ -179,6 +182,7 @@ def _refine(
     channels: int,
     mean: jax.Array,
     numbers: AdaptiveParameters,
+    slopes: bool,
 ) -> tuple[Fit, jax.Array]:
     """One level finer: its own fit, and what is merged so far with its share added."""
     size = grid.moments.shape[1:]
@@ -188,7 +192,7 @@ def _refine(
     # Windows end where what is known so far of the brightness changes.
     edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
     features = jnp.concatenate([_guide_features(grid, shift.size, numbers), edge[None]])
-    fine = fit_level(grid, features, shift, channels, mean, numbers)
+    fine = fit_level(grid, features, shift, channels, mean, numbers, slopes=slopes)
     reference = level**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     return fine, merged + share * (fine.coefficients - coarse.coefficients)

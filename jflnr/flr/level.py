@@ -73,6 +73,8 @@ def fit_level(
     channels: int,
     mean: jax.Array,
     numbers: AdaptiveParameters,
+    *,
+    slopes: bool = True,
 ) -> Fit:
     """Fit the models of one level.
 
@@ -80,22 +82,27 @@ def fit_level(
     window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
 
     features: `(F, h, w)`, what must be alike in a window. mean: brightness of the whole frame.
+    slopes: whether the position in the window is a guide too.
     """
-    guides = shift.size
+    guides, positions = shift.size, 2 if slopes else 0
     window = window_over(features, numbers.sigma)
-    moments = gather_moments(grid.moments, window, numbers.sigma, guides, channels)
+    moments = (
+        gather_moments(grid.moments, window, numbers.sigma, guides, channels)
+        if slopes
+        else gather(grid.moments, window)
+    )
     n = jnp.maximum(moments[0], 1e-12)
     variance = gather(grid.noise, window.squared())[0] / (n * grid.block) ** 2
-    start = index_xy(0, 0, guides + 2, channels)
+    start = index_xy(0, 0, guides + positions, channels)
     colour = moments[start : start + channels] / n
     level = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
     relative = variance / (jnp.maximum(level, 0) ** 2 + 0.01 * mean**2)
     ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
 
     # Positions are centred on the window already, so only their own ridge is added.
-    for i in (guides + 1, guides + 2):
+    for i in range(guides + 1, guides + 1 + positions):
         moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
-    centred = jnp.concatenate([shift, jnp.zeros(2, shift.dtype)])
+    centred = jnp.concatenate([shift, jnp.zeros(positions, shift.dtype)])
     regular = numbers.eps + ridge, numbers.eps_prime + ridge
     coefficients = solve_strips(moments, centred, *regular, channels)
     return Fit(coefficients[: guides + 1], variance, window)

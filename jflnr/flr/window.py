@@ -85,9 +85,10 @@ def gather_moments(
 
 
 def _gather(planes: jax.Array, taps: jax.Array, axis: int) -> jax.Array:
-    total = jnp.zeros_like(planes)
-    for tap, moved in zip(taps, _moved(planes, axis), strict=True):
-        total += tap * moved
+    moved = _moved(planes, axis)
+    total = taps[0] * moved[0]
+    for tap, one in zip(taps[1:], moved[1:], strict=True):
+        total += tap * one
     # Without the barrier the compiler repeats the first pass for every tap of the second.
     return lax.optimization_barrier(total)
 
@@ -96,7 +97,8 @@ def _moved(planes: jax.Array, axis: int) -> list[jax.Array]:
     """The planes moved by -REACH to REACH blocks, zeros from outside."""
     size = planes.shape[axis]
     margins = [(REACH, REACH) if a == axis else (0, 0) for a in range(planes.ndim)]
-    padded = jnp.pad(planes, margins)
+    # Padded once, instead of a test for the border at every tap.
+    padded = lax.optimization_barrier(jnp.pad(planes, margins))
     return [lax.slice_in_dim(padded, k, k + size, axis=axis) for k in range(2 * REACH + 1)]
 
 
