@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
   jflnr denoise render.exr -o out/ --direct --png --method flr-adaptive
-  jflnr denoise shot/ -o clean/ --keep-channels every pass of the input, the picture clean
+  jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with the clean ones
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
 """
@@ -54,7 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--eps-prime", type=float, help="additive regularisation")
     add("--block", type=int, help="side of the squares of pixels that share one model")
     add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
-    add("--keep-channels", action="store_true", help="write the input's other channels too")
+    add(
+        "--channels",
+        choices=layouts.CHOICES,
+        default="light",
+        help="write the picture only, also the denoised light (default), or all of the input too",
+    )
     add("--reference", action="store_true", help="print metrics against the layer `reference`")
     add("--overwrite", action="store_true", help="replace outputs that exist")
     add("--json", action="store_true", help="print one JSON list instead of lines")
@@ -240,7 +245,7 @@ def _write(
         lit = composite(dataclasses.replace(frame, emission=None), lights["indirect"])
         write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
     mask = None if frame.mask is None else np.asarray(frame.mask)
-    channels = layouts.output_channels(source, picture, lights, mask, arguments.keep_channels)
+    channels = layouts.output_channels(source, picture, lights, mask, arguments.channels)
     comments = json.dumps(source.header | {"denoiser": about})
     attributes = source.attributes
     exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)

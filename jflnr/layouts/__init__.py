@@ -7,10 +7,11 @@ a Frame, so that nothing behind this package knows where a frame came from (docs
 from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
 from jflnr.layouts.channels import LAYERS, Layout, layer
-from jflnr.layouts.output import output_channels
+from jflnr.layouts.output import CHOICES, output_channels
 from jflnr.layouts.source import Source, load, parse_header
 
 __all__ = [
+    "CHOICES",
     "LAYERS",
     "Layout",
     "Source",

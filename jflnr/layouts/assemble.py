@@ -59,7 +59,7 @@ def _separated(images: Layers) -> Layers:
     depth, albedo, beauty = images["depth"], images["albedo"], images.get("beauty")
     assert depth is not None and albedo is not None
     depth = np.where((depth > 0) & (depth < SKY), depth, 0)
-    mask, indirect = images["mask"], images["indirect"]
+    mask, indirect, emission = images["mask"], images["indirect"], images["emission"]
     if mask is None:
         surface = (depth > 0) & (albedo > DARK).any(axis=-1, keepdims=True)
         mask = surface.astype(np.float32)
@@ -68,8 +68,9 @@ def _separated(images: Layers) -> Layers:
         radiance = images.get("radiance")
         radiance = beauty if radiance is None else radiance
         assert radiance is not None
+        if emission is not None:
+            radiance = radiance - emission
         indirect = demodulate(radiance, albedo)
-    emission = images["emission"]
     if beauty is not None:
         direct = images["direct"]
         emission = rest(beauty, albedo, indirect if direct is None else direct + indirect)

@@ -20,6 +20,10 @@ PASSES = {
     "direct": ("Diffuse Direct", "DiffDir"),
     "albedo": ("Diffuse Color", "DiffCol"),
 }
+WHOLE_PICTURE = {
+    "albedo": ("Denoising Albedo", *PASSES["albedo"]),
+    "emission": ("Emission", "Emit"),
+}
 GUIDES = {
     "normal": ("Normal", "Denoising Normal"),
     "depth": ("Depth", "Denoising Depth"),
@@ -32,7 +36,7 @@ ADVICE = {
     "normal": "switch on Normal under View Layer > Passes > Data",
     "depth": "switch on Z under View Layer > Passes > Data",
 }
-WHOLE = (
+WHOLE_NOTE = (
     "there is no pass Diffuse Indirect with Diffuse Color, so the whole picture is divided by "
     "{} and denoised; with both passes, only diffuse indirect light would be"
 )
@@ -52,8 +56,8 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     light = _find(passes, PASSES)
     notes = []
     if "indirect" not in light or "albedo" not in light:
-        light = _find(passes, {"albedo": ("Denoising Albedo", *PASSES["albedo"])})
-        notes.append(WHOLE.format(light.get("albedo", "albedo")))
+        light = _find(passes, WHOLE_PICTURE)
+        notes.append(WHOLE_NOTE.format(light.get("albedo", "albedo")))
     if ao := _find(passes, {"ao": AO}).get("ao"):
         notes.append(NOISY_AO.format(_layer(view, ao)))
     if len(views) > 1:

@@ -16,6 +16,7 @@ NAMES = {
     ),
     "depth": ("depth", "z"),
     "position": ("position", "pos", "p", "world_position"),
+    "emission": ("emission", "emitted", "emit"),
     "ao": ("ao", "ambient_occlusion"),
 }
 BEAUTY = ("", "beauty", "composite", "rgba", "rgb", "color")

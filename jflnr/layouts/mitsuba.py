@@ -13,7 +13,7 @@ from jflnr.layouts import common
 from jflnr.layouts.channels import Layout
 
 NOTES = (
-    "R, G, B is divided by albedo and denoised",
+    "R, G, B, without a nested integrator called emission, is divided by albedo and denoised",
     "depth is Mitsuba's distance along the ray, which serves as a guide as well as depth does",
 )
 ADVICE = {

@@ -6,32 +6,34 @@ import numpy as np
 
 from jflnr.layouts.source import Source
 
+CHOICES = ("picture", "light", "all")
+
 
 def output_channels(
     source: Source,
     picture: np.ndarray,
     lights: Mapping[str, np.ndarray],
     mask: np.ndarray | None = None,
-    keep: bool = False,
+    choice: str = "light",
 ) -> dict[str, np.ndarray]:
-    """What to write: the picture as `R`, `G`, `B`, with its alpha, and `lights` as layers.
+    """What to write, from the picture (H, W, 3) and the denoised light (H, W, 3) by layer.
 
-    picture: (H, W, 3). lights: denoised light (H, W, 3) by layer, `indirect` and maybe `direct`.
-    keep: also every channel of the source. Of another program's file, the picture and, where
-    `mask` (H, W, 1) is 1, the light passes are replaced by the denoised ones: the file can then
-    stand in for the source, and its passes still sum to its picture.
+    choice: `picture`, as `R`, `G`, `B` with its alpha; `light`, with the layers `indirect` and
+    maybe `direct`; `all`, also with every channel of the source. Of another program's file, the
+    picture and, where `mask` (H, W, 1) is 1, the light passes are then the denoised ones: the file
+    can stand in for the source, and its passes still sum to its picture.
     """
     layout = source.layout
     channels: dict[str, np.ndarray] = {}
-    if keep:
+    if choice == "all":
         channels |= {name: pixels for name, pixels in source.channels.items() if ":" not in name}
         channels |= _planes(layout.picture[:3], picture)
-    if keep and layout.picture:
+    if choice == "all" and layout.picture:
         surface = True if mask is None else mask[..., 0] > 0
         for layer, light in lights.items():
             for name, plane in _planes(layout.channels.get(layer, ()), light).items():
                 channels[name] = np.where(surface, plane, source.channels[name])
-    for layer, light in lights.items():
+    for layer, light in lights.items() if choice != "picture" else ():
         channels |= _planes(tuple(f"{layer}.{c}" for c in "RGB"), light)
     channels |= _planes(("R", "G", "B"), picture)
     for alpha in layout.picture[3:]:

@@ -1,0 +1,85 @@
+"""Run by Blender's Python: render a small scene as multilayer EXR.
+
+    python blender_scene.py OUT WIDTH HEIGHT PASSES [SCRIPT]
+
+PASSES is `all`, `denoising` (only what `Denoising Data` gives) or `denoised` (both, with Blender's
+own denoiser on). With SCRIPT, that example is run on the scene instead, and its picture saved.
+"""
+
+import runpy
+import sys
+from math import pi
+
+import bpy
+
+LIGHT = [
+    f"{kind}_{part}"
+    for kind in ("diffuse", "glossy", "transmission")
+    for part in ("direct", "indirect", "color")
+]
+PASSES = [*LIGHT, "emit", "environment", "ambient_occlusion", "normal", "z", "position"]
+
+
+def material(colour, metallic=0.0, glow=0.0):
+    made = bpy.data.materials.new("material")
+    made.use_nodes = True
+    inputs = made.node_tree.nodes["Principled BSDF"].inputs
+    inputs["Base Color"].default_value = (*colour, 1)
+    inputs["Metallic"].default_value = metallic
+    inputs["Roughness"].default_value = 0.1 if metallic else 0.9
+    inputs["Emission Color"].default_value = (1, 1, 1, 1)
+    inputs["Emission Strength"].default_value = glow
+    return made
+
+
+def put(shape, made, **where):
+    getattr(bpy.ops.mesh, f"primitive_{shape}_add")(**where)
+    bpy.context.object.data.materials.append(made)
+
+
+def build(width, height):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    put("plane", material((0.8, 0.8, 0.8)), size=10)
+    put("plane", material((0.8, 0.1, 0.1)), size=4, location=(0, 4, 0), rotation=(pi / 2, 0, 0))
+    put("cube", material((0.1, 0.6, 0.2)), location=(-1.2, 0, 1))
+    put("uv_sphere", material((0.9, 0.9, 0.9), metallic=1.0), location=(1.2, 1, 1))
+    put("uv_sphere", material((0, 0, 0), glow=5.0), location=(2.2, -0.5, 0.4), radius=0.4)
+    bpy.ops.object.light_add(type="AREA", location=(3, -3, 5), rotation=(0.7, 0.4, 0.8))
+    bpy.context.object.data.energy = 400
+    bpy.ops.object.camera_add(location=(0, -7, 2.5), rotation=(1.35, 0, 0))
+    scene.camera = bpy.context.object
+    scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 1
+    scene.cycles.use_denoising = False
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.resolution_percentage = 100
+    return scene
+
+
+def write(scene, path, passes):
+    layer, image = scene.view_layers[0], scene.render.image_settings
+    for name in PASSES if passes != "denoising" else ():
+        setattr(layer, f"use_pass_{name}", True)
+    layer.cycles.denoising_store_passes = passes != "all"
+    scene.cycles.use_denoising = passes == "denoised"
+    if hasattr(image, "media_type"):
+        image.media_type = "MULTI_LAYER_IMAGE"
+    image.file_format, image.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+
+
+def main(path, width, height, passes, script=""):
+    scene = build(int(width), int(height))
+    if not script:
+        return write(scene, path, passes)
+    before = scene.render.filepath, scene.render.image_settings.file_format
+    picture = runpy.run_path(script)["main"]()
+    assert (scene.render.filepath, scene.render.image_settings.file_format) == before
+    assert tuple(picture.size) == (int(width), int(height))
+    picture.file_format = "OPEN_EXR"
+    picture.save(filepath=path)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
