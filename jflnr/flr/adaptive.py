@@ -103,7 +103,7 @@ def fit_pilot(
 ) -> jax.Array:
     """Models of the brightness from the moments of pass 1. Returns `(Q + 1, 1, h, w)`."""
     grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
-    features = _guide_features(grid, shift.size, numbers)
+    features = guide_features(grid, shift.size, numbers)
     return fit_level(grid, features, shift, 1, mean, numbers).coefficients
 
 
@@ -163,7 +163,7 @@ def fit_pyramid(
     for _ in range(levels - 1):
         last = grids[-1]
         grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
-    features = _guide_features(grids[-1], shift.size, numbers)
+    features = guide_features(grids[-1], shift.size, numbers)
     coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
     merged = coarse.coefficients
     for grid in reversed(grids[:-1]):
@@ -191,12 +191,13 @@ def _refine(
     level = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
     # Windows end where what is known so far of the brightness changes.
     edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
-    features = jnp.concatenate([_guide_features(grid, shift.size, numbers), edge[None]])
+    features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
     fine = fit_level(grid, features, shift, channels, mean, numbers, slopes=slopes)
     reference = level**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     return fine, merged + share * (fine.coefficients - coarse.coefficients)
 
 
-def _guide_features(grid: Grid, guides: int, numbers: AdaptiveParameters) -> jax.Array:
+def guide_features(grid: Grid, guides: int, numbers: AdaptiveParameters) -> jax.Array:
+    """What of the guides must be alike inside a window, `(Q, h, w)`."""
     return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
