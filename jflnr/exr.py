@@ -96,7 +96,7 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
         for name, pixels in part.channels.items():
             layered = "." in name or len(parts) == 1
             channels[name if layered and name not in channels else f"{part.name}.{name}"] = pixels
-    _check_sizes(path, channels)
+    check_sizes(path, channels)
     if len({tuple(map(int, part.header["dataWindow"][0])) for part in parts}) > 1:
         raise ValueError(f"{path}: its parts do not start at the same pixel")
     return channels
@@ -115,7 +115,7 @@ def write_channels(
     `others` are further attributes of the header.
     """
     path = Path(path)
-    _check_sizes(path, channels)
+    check_sizes(path, channels)
     if wrong := [f"{n} is {a.dtype}" for n, a in channels.items() if a.dtype.name not in TYPES]:
         raise TypeError(f"channels must be {', '.join(TYPES)}; {wrong[0]}")
     height, width = next(iter(channels.values())).shape
@@ -203,7 +203,8 @@ def _check_header(path: Path, part: _Part) -> None:
         )
 
 
-def _check_sizes(path: Path, channels: Mapping[str, np.ndarray]) -> None:
+def check_sizes(path: Path, channels: Mapping[str, np.ndarray]) -> None:
+    """Raise ValueError, naming `path`, unless all channels are of one size that is not zero."""
     sizes = {pixels.shape: name for name, pixels in channels.items()}
     if not sizes or any(0 in size for size in sizes):
         raise ValueError(f"{path} has zero size: there are no pixels in it")

@@ -10,6 +10,8 @@ from jflnr.layouts.source import Source
 
 Layers = dict[str, np.ndarray | None]
 
+GUIDES = ("albedo", "normal", "depth")  # what no frame can do without
+
 # Farther than anything: programs write 1e10 or infinity where nothing is hit.
 SKY = 1e9
 
@@ -21,14 +23,15 @@ def assemble(source: Source) -> Layers:
     Raises ValueError, naming the file, as `layer` does.
     """
     layout, channels = source.layout, source.channels
-    names = NATIVE | dict(layout.channels)
+    absent = [layer for layer in GUIDES if layer not in layout.channels]
+    names = dict(layout.channels) | {layer: NATIVE[layer] for layer in absent}
     there = {name for name in names if any(channel in channels for channel in names[name])}
 
     def read(name: str) -> np.ndarray:
         return layer(channels, name, names[name], str(source.path), layout.advice.get(name, ""))
 
     camera = Camera.of(source.attributes.others | source.header)
-    needed = {layout.light, "albedo", "normal", "depth"}
+    needed = {layout.light, *GUIDES}
     if camera is not None and "position" in there and "depth" not in there:
         needed.remove("depth")
     images: Layers = {name: read(name) for name in names if name in needed | there}

@@ -16,7 +16,7 @@ def layout(spp: int, counts: Sequence[int] = ()) -> Layout:
     names = NATIVE | {"indirect": tuple(f"indirect_{spp}.{c}" for c in "RGB")}
     listed = ", ".join(map(str, counts))
     advice = {"indirect": f"there is indirect light for spp {listed}"} if counts else {}
-    return Layout("jflnr", names, advice=advice)
+    return Layout("jflnr" if counts else "unknown", names, advice=advice)
 
 
 def spp_present(channels: Mapping[str, np.ndarray]) -> list[int]:

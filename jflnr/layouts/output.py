@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from jflnr.layouts.override import BORROWED
 from jflnr.layouts.source import Source
 
 CHOICES = ("picture", "light", "all")
@@ -26,7 +27,7 @@ def output_channels(
     layout = source.layout
     channels: dict[str, np.ndarray] = {}
     if choice == "all":
-        channels |= {name: pixels for name, pixels in source.channels.items() if ":" not in name}
+        channels |= source.channels
         channels |= _planes(layout.picture[:3], picture)
     if choice == "all" and layout.picture:
         surface = True if mask is None else mask[..., 0] > 0
@@ -38,7 +39,7 @@ def output_channels(
     channels |= _planes(("R", "G", "B"), picture)
     for alpha in layout.picture[3:]:
         channels["A"] = source.channels[alpha]
-    return channels
+    return {n: pixels for n, pixels in channels.items() if not n.startswith(BORROWED)}
 
 
 def _planes(names: tuple[str, ...], image: np.ndarray) -> dict[str, np.ndarray]:

@@ -12,6 +12,8 @@ from jflnr.layouts.channels import LAYERS, Layout, in_layer, present
 
 FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE)
 
+BORROWED = "file://"  # how the names of another file's channels start
+
 
 def override(
     layout: Layout, channels: dict[str, np.ndarray], layers: Mapping[str, str], path: Path
@@ -26,9 +28,12 @@ def override(
     for name, value in layers.items():
         checks.choice("layers", name, (*LAYERS, "beauty", "radiance"))
         names[name] = _find(channels, name, value, path)
-    if "radiance" in layers:
+    exr.check_sizes(path, channels)
+    if "radiance" in layers or (
+        "beauty" in layers and not set(names.get("indirect", ())) & set(channels)
+    ):
         names = {n: c for n, c in names.items() if n not in ("indirect", "direct") or n in layers}
-    return replace(layout, channels=names)
+    return replace(layout, channels=names, picture=layout.picture or names.get("beauty", ()))
 
 
 def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) -> tuple[str, ...]:
@@ -37,8 +42,9 @@ def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) ->
         other = path.parent / match["file"].replace("{stem}", path.stem)
         read = exr.read_channels(other)
         found = _choose(read, name, match["name"] or "", str(other))
-        channels |= {f"{other}:{channel}": read[channel] for channel in found}
-        return tuple(f"{other}:{channel}" for channel in found)
+        borrowed = {f"{BORROWED}{other}:{channel}": read[channel] for channel in found}
+        channels |= borrowed
+        return tuple(borrowed)
     return _choose(channels, name, value, str(path))
 
 
