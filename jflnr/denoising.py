@@ -7,7 +7,7 @@ import functools
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -39,6 +39,7 @@ def denoise(
     parameters: Parameters | AdaptiveParameters | None = None,
     block: int = BLOCK,
     keep_energy: bool = False,
+    tile: int | None = None,
 ) -> Array:
     """Denoise the indirect light of a frame.
 
@@ -50,6 +51,8 @@ def denoise(
     the frame has it, ao. parameters: of the method; the fitted defaults if None.
     block: pixels on a side that share one model.
     keep_energy: for `flr-adaptive`, keep the mean radiance exactly instead of nearly.
+    tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
+    (docs/large.md); on all of them if None.
     Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
     Returns `(H, W, C)` float32, demodulated indirect radiance.
 
@@ -76,15 +79,47 @@ def denoise(
             raise ValueError("method flr-adaptive runs on the jax backend only")
         if inputs.indirect.shape[:2] != inputs.normal.shape[:2]:
             raise ValueError("method flr-adaptive needs frame.indirect at the size of the guides")
-        return _denoise_adaptive(inputs, settings, names, block, keep_energy)
-    settings = _parameters(parameters, DEFAULT)
-    support = _support(settings, max(inputs.normal.shape[:2]))
+        if tile is None:
+            return _denoise_adaptive(inputs, settings, names, block, keep_energy)
+    else:
+        settings = _parameters(parameters, DEFAULT)
+        if tile is None:
+            return denoise_flr(inputs, settings, names, block, backend)
+    from jflnr.large import strips
+
+    checks.positive_integer("tile", tile)
+    rows = strips.rows_of(inputs)
+    options = strips.Options(method, settings, names, block, backend, keep_energy)
+    return np.concatenate([strip for _, strip in strips.denoise(rows, options, tile)])
+
+
+class Part(NamedTuple):
+    """What a part of a frame takes from the whole: how far its windows reach, and what `layers` and
+    `flr` would else find for themselves."""
+
+    support: int
+    scene: guide_layers.Scene | None = None
+    shift: jax.Array | None = None
+
+
+def denoise_flr(
+    frame: Frame,
+    parameters: Parameters,
+    names: tuple[str, ...],
+    block: int,
+    backend: str,
+    part: Part | None = None,
+) -> Array:
+    """Method `flr`, of a frame or of a part of one."""
+    if part is None:
+        part = Part(support_of(parameters, max(frame.normal.shape[:2])))
     if backend == "opencl":
         from jflnr import opencl
 
-        images, coarse_block = _images(inputs, names), _coarse_block(inputs, block)
-        return opencl.flr(parameters=settings, block=coarse_block, support=support, **images)
-    return _denoise(inputs, settings, names, block, support)
+        images, coarse_block = _images(frame, names, part.scene), _coarse_block(frame, block)
+        support = part.support
+        return opencl.flr(parameters=parameters, block=coarse_block, support=support, **images)
+    return _denoise(frame, parameters, names, block, *part)
 
 
 def _parameters(given: Any, default: Any) -> Any:
@@ -118,7 +153,7 @@ def _check_sizes(frame: Frame) -> None:
         )
 
 
-def _support(parameters: Parameters, longest: int) -> int:
+def support_of(parameters: Parameters, longest: int) -> int:
     """Three standard deviations, in steps of 24 pixels so that few programs are compiled.
 
     No farther than the frame's longest side, whatever a parameter file says.
@@ -157,12 +192,35 @@ def _images(
     }
 
 
+def adaptive_images(
+    frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene | None = None
+) -> dict[str, Any]:
+    """The images that `flr_adaptive` takes, ambient occlusion without its noise.
+
+    scene: of the frame that this one is a part of; the frame's own if None.
+    """
+    images = _images(frame, names, scene)
+    if "ao" in names:
+        ao = names.index("ao")
+        normal, depth = jnp.asarray(frame.normal), jnp.asarray(frame.depth)
+        layers = list(images["guides"])
+        layers[ao] = smooth_guide(layers[ao], normal, depth)
+        images["guides"] = tuple(layers)
+    return images
+
+
 @functools.partial(jax.jit, static_argnames=("names", "block", "support"))
 def _denoise(
-    frame: Frame, parameters: Parameters, names: tuple[str, ...], block: int, support: int
+    frame: Frame,
+    parameters: Parameters,
+    names: tuple[str, ...],
+    block: int,
+    support: int,
+    scene: guide_layers.Scene | None,
+    shift: jax.Array | None,
 ) -> jax.Array:
-    block = _coarse_block(frame, block)
-    return flr(parameters=parameters, block=block, support=support, **_images(frame, names))
+    images, block = _images(frame, names, scene), _coarse_block(frame, block)
+    return flr(parameters=parameters, block=block, support=support, shift=shift, **images)
 
 
 @functools.partial(jax.jit, static_argnames=("names", "block", "keep_energy"))
@@ -173,11 +231,5 @@ def _denoise_adaptive(
     block: int,
     keep_energy: bool,
 ) -> jax.Array:
-    images = _images(frame, names)
-    if "ao" in names:
-        ao = names.index("ao")
-        normal, depth = jnp.asarray(frame.normal), jnp.asarray(frame.depth)
-        layers = list(images["guides"])
-        layers[ao] = smooth_guide(layers[ao], normal, depth)
-        images["guides"] = tuple(layers)
+    images = adaptive_images(frame, names)
     return flr_adaptive(parameters=parameters, block=block, keep_energy=keep_energy, **images)

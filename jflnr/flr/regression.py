@@ -22,6 +22,7 @@ def flr(
     support: int = 72,
     guides_map: Guides | None = None,
     weight: jax.Array | None = None,
+    shift: jax.Array | None = None,
     solver: Solver = "cholesky",
 ) -> jax.Array:
     """Fit the guides to a noisy image by windowed least squares and evaluate the fit.
@@ -37,14 +38,14 @@ def flr(
     the model is evaluated on (X_map of section 3.3; with f > 1 the joint upsampling of section
     3.2.1, where up to f - 1 rows and columns may be missing); None evaluates on `guides`.
     weight: `(H, W)`, how much each pixel counts in the fit; 0 removes it, as does any value that
-    is not finite.
+    is not finite. shift: `(Q,)`, from `centre` of the image that this one is a part of.
     Returns `(H, W, C)`, or `(f H, f W, C)`.
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
     checks.choice("solver", solver, SOLVERS)
     factor = check_regression(target, guides, guides_map, weight, block, support)
-    shift = centre(guides, weight)
+    shift = centre(guides, weight) if shift is None else shift
     moments = collect(target, guides, shift, block, weight)
     step = block * factor
     moments = blur(moments, parameters.sigma / step, reach=-(-support // step))

@@ -1,0 +1,102 @@
+"""The steps of adaptive FLR on one strip of pixels or one tile of blocks, compiled."""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jflnr import guides as guide_layers
+from jflnr.denoising import adaptive_images
+from jflnr.flr import adaptive, energy
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
+from jflnr.flr.apply import apply_rows
+from jflnr.flr.level import Grid
+from jflnr.flr.moments import Guides
+from jflnr.frame import Frame
+
+_on_pixels = functools.partial(jax.jit, static_argnames=("names", "block"))
+_on_blocks = functools.partial(jax.jit, static_argnames=("channels", "block"))
+
+
+class Common(NamedTuple):
+    """What all parts of a frame share. shift: `(Q,)`. numbers: the constants themselves."""
+
+    scene: guide_layers.Scene
+    shift: jax.Array
+    numbers: AdaptiveParameters
+
+
+@functools.partial(jax.jit, static_argnames="names")
+def guides_of(
+    frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene
+) -> tuple[Guides, None]:
+    """The guides of a frame; no weight, since `flr_adaptive` centres them without."""
+    return adaptive_images(frame, names, scene)["guides"], None
+
+
+@_on_pixels
+def light_of_strip(strip: Frame, common: Common, names: tuple[str, ...], block: int) -> jax.Array:
+    """Pass 1: moments of the brightness on blocks twice as large as `block`, `(K, h/2, w/2)`."""
+    images = _images(strip, common, names)
+    return adaptive.collect_light(
+        images["target"], images["guides"], common.shift, images["weight"], block
+    )
+
+
+@functools.partial(jax.jit, static_argnames="block")
+def pilot_of_tile(light: jax.Array, mean: jax.Array, common: Common, block: int) -> jax.Array:
+    """Models of the brightness on blocks four times as large as `block`."""
+    return adaptive.fit_pilot(light, mean, common.shift, common.numbers, block)
+
+
+@_on_pixels
+def moments_of_strip(
+    strip: Frame, pilot: adaptive.Pilot, common: Common, names: tuple[str, ...], block: int
+) -> jax.Array:
+    """Pass 2: weighted moments on the finest blocks and their noise, `(K + 1, h, w)`."""
+    images = _images(strip, common, names)
+    grid = adaptive.collect_grid(
+        images["target"],
+        images["guides"],
+        common.shift,
+        pilot,
+        images["weight"],
+        common.numbers,
+        block,
+    )
+    return jnp.concatenate([grid.moments, grid.noise])
+
+
+@_on_blocks
+def models_of_tile(
+    moments: jax.Array,
+    light: jax.Array,
+    mean: jax.Array,
+    common: Common,
+    channels: int,
+    block: int,
+) -> tuple[jax.Array, jax.Array]:
+    """Models of the finest blocks `(Q + 1, C, h, w)`, and the brightness `(h/2, w/2)` they give."""
+    grid = Grid(moments[:-1], moments[-1:], block)
+    guides = common.shift.size
+    models = adaptive.fit_pyramid(
+        grid, common.shift, channels, adaptive.LEVELS, mean, common.numbers
+    )
+    return models, energy.block_light(models, light, guides)
+
+
+@_on_pixels
+def image_of_strip(
+    strip: Frame, models: jax.Array, common: Common, names: tuple[str, ...], block: int
+) -> jax.Array:
+    """Pass 3: the denoised light `(H, W, C)`. models: `(Q + 1, C, h + 2, w)`."""
+    return apply_rows(models, _images(strip, common, names)["guides"], common.shift, block)
+
+
+def _images(strip: Frame, common: Common, names: tuple[str, ...]) -> dict:
+    """The strip's images without the rows above and below."""
+    images = adaptive_images(strip, names, common.scene)
+    return jax.tree.map(lambda a: a[1:-1], images)

@@ -1,0 +1,55 @@
+"""Any method piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from jflnr import guides as guide_layers
+from jflnr.denoising import Part, denoise_flr, support_of
+from jflnr.frame import Array, Frame
+from jflnr.large import local, pyramid
+from jflnr.large.local import Strip
+from jflnr.large.source import Rows, rows_of, scene_of, shift_of
+
+__all__ = ["Options", "Strip", "denoise", "rows_of"]
+
+
+class Options(NamedTuple):
+    """The arguments of `jflnr.denoise`; `names` of the guides, and `parameters`, are given."""
+
+    method: str
+    parameters: Any
+    names: tuple[str, ...]
+    block: int
+    backend: str = "jax"
+    keep_energy: bool = False
+
+
+def denoise(rows: Rows, options: Options, tile: int, folder: Path | None = None) -> Iterator[Strip]:
+    """Denoise a frame in strips from top to bottom.
+
+    tile: side in pixels of a square as large as what is worked on at a time. folder: where
+    temporary files go; the system's own if None.
+    """
+    method, parameters, names, block, backend, keep_energy = options
+    if method == "flr":
+        support = support_of(parameters, max(rows.height, rows.width))
+        scene = scene_of(rows)
+
+        def images(frame: Frame) -> tuple[Any, Any]:
+            mask = frame.mask
+            weight = None if mask is None else mask[..., 0] > 0
+            return guide_layers.layers(frame, names, scene), weight
+
+        part = Part(support, scene, shift_of(rows, images))
+
+        def one(frame: Frame) -> Array:
+            return denoise_flr(frame, parameters, names, block, backend, part)
+
+        height = max(tile * tile // rows.width, 1)
+        return local.strips(rows, one, height=height, block=block, support=support)
+    return pyramid.strips(
+        rows, names, parameters, block=block, tile=tile, keep_energy=keep_energy, folder=folder
+    )
