@@ -150,6 +150,22 @@ def _weights(
     return weights, jnp.where(usable, weights * (light - expected), 0) ** 2
 
 
+class Step(NamedTuple):
+    """One level finer than what was known before.
+
+    fine: its fit. coarse: that of the coarser level, on this grid. level: `(h, w)`, brightness
+    known before. share: `(h, w)`, how much of their difference is signal. merged: models
+    `(Q + 1, C, h, w)` with that share added.
+    """
+
+    grid: Grid
+    fine: Fit
+    coarse: Fit
+    level: jax.Array
+    share: jax.Array
+    merged: jax.Array
+
+
 def fit_pyramid(
     grid: Grid,
     shift: jax.Array,
@@ -159,19 +175,33 @@ def fit_pyramid(
     numbers: AdaptiveParameters,
 ) -> jax.Array:
     """Models of the finest grid, put together from all levels. Returns `(Q + 1, C, h, w)`."""
+    coarsest, steps = fit_levels(grid, shift, channels, levels, mean, numbers)
+    return steps[-1].merged if steps else coarsest.coefficients
+
+
+def fit_levels(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    levels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+) -> tuple[Fit, list[Step]]:
+    """The fit of the coarsest grid, and the steps from there to the finest."""
     grids = [grid]
     for _ in range(levels - 1):
         last = grids[-1]
         grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
     features = guide_features(grids[-1], shift.size, numbers)
-    coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
-    merged = coarse.coefficients
+    coarsest = coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
+    merged, steps = coarse.coefficients, list[Step]()
     for grid in reversed(grids[:-1]):
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
         slopes = grid is not grids[0]
-        coarse, merged = _refine(grid, coarse, merged, shift, channels, mean, numbers, slopes)
-    return merged
+        steps.append(_refine(grid, coarse, merged, shift, channels, mean, numbers, slopes))
+        coarse, merged = steps[-1].fine, steps[-1].merged
+    return coarsest, steps
 
 
 def _refine(
@@ -183,7 +213,7 @@ def _refine(
     mean: jax.Array,
     numbers: AdaptiveParameters,
     slopes: bool,
-) -> tuple[Fit, jax.Array]:
+) -> Step:
     """One level finer: its own fit, and what is merged so far with its share added."""
     size = grid.moments.shape[1:]
     window = coarse.window
@@ -195,7 +225,8 @@ def _refine(
     fine = fit_level(grid, features, shift, channels, mean, numbers, slopes=slopes)
     reference = level**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
-    return fine, merged + share * (fine.coefficients - coarse.coefficients)
+    merged = merged + share * (fine.coefficients - coarse.coefficients)
+    return Step(grid, fine, coarse, level, share, merged)
 
 
 def guide_features(grid: Grid, guides: int, numbers: AdaptiveParameters) -> jax.Array:
