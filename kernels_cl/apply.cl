@@ -6,7 +6,9 @@
 // coordinate (x + 0.5) / STEP - 0.5, clamped to the outermost centres. A guide that is not finite
 // counts as being at `shift`. The interpolated models are never stored.
 //
-// Define beside those of the headers: STEP, distance of the models in pixels.
+// Defines beside those of the headers: STEP, distance of the models in pixels; RESTORED, if models are
+// multiplied by max(1 + rate * restored, 0) first, `restored` being (ceil(h / 2), restored_pitch), a
+// number for each 2 x 2 models (adaptive FLR, energy.cl).
 
 #include "vectors.h"
 #include "sizes.h"
@@ -16,31 +18,65 @@
 #error "STEP, the distance of the models in pixels, must be at least 1"
 #endif
 
-// Four neighbouring block centres span a cell of STEP x STEP pixels; STRIPS vectors cover its width.
+// Four neighbouring block centres span a cell of STEP x STEP pixels. STRIPS vectors cover its width,
+// or one vector CELLS of them side by side.
 #define STRIPS ((STEP + WIDTH - 1) / WIDTH)
+#define CELLS (STEP < WIDTH && WIDTH % STEP == 0 ? WIDTH / STEP : 1)
 
-// One work-item per strip: global size ((w + 1) STRIPS, h + 1).
+// Lane i lies between the centres of blocks LEFT(i) and RIGHT(i).
+#define CELL(i) (CELLS > 1 ? (i) / STEP : 0)
+#define FROM_CENTRE(i) (i) - CELL(i) * STEP
+#define LEFT(i) CLAMP(cell_x + CELL(i), 0, w - 1)
+#define RIGHT(i) CLAMP(cell_x + CELL(i) + 1, 0, w - 1)
+#define AT_LEFT(i) row[LEFT(i)]
+#define AT_RIGHT(i) row[RIGHT(i)]
+
+// A coefficient along a row of block centres. from, to: factors for the models on both sides.
+INLINE real along(global const float *row, int cell_x, int w, real right, real from, real to)
+{
+    const real start = from * LANES(real, AT_LEFT), stop = to * LANES(real, AT_RIGHT);
+    return start + right * (stop - start);
+}
+
+#ifdef RESTORED
+#define RESTORED_PARAMETERS \
+    , int restored_pitch, global const float *rate, global const float *restored
+#define FACTOR(bx) MAX(1 + rate[0] * restored[(long)(by / 2) * restored_pitch + (bx) / 2], 0)
+#else
+#define RESTORED_PARAMETERS
+#define FACTOR(bx) 1
+#endif
+#define LEFT_FACTOR(i) FACTOR(LEFT(i))
+#define RIGHT_FACTOR(i) FACTOR(RIGHT(i))
+
+// One work-item per strip: global size (ceil((w + 1) / CELLS) STRIPS, h + 1).
 kernel void apply(
     int width, int height, int h, int w, int pitch, global const float *model, GUIDE_PARAMETERS,
-    constant float *shift, global output_t *output)
+    constant float *shift, global output_t *output RESTORED_PARAMETERS)
 {
-    const int cell_x = (int)get_global_id(0) / STRIPS - 1, cell_y = (int)get_global_id(1) - 1;
+    const int cell_x = (int)get_global_id(0) / STRIPS * CELLS - 1;
+    const int cell_y = (int)get_global_id(1) - 1;
     const int start = cell_x * STEP + STEP / 2;
     const int x0 = start + (int)get_global_id(0) % STRIPS * WIDTH;
-    const int first = MAX(0, -x0), last = MIN(MIN(start + STEP, width) - x0, WIDTH) - 1;
+    const int first = MAX(0, -x0), last = MIN(MIN(start + CELLS * STEP, width) - x0, WIDTH) - 1;
     if (first > last || cell_y >= h) return;
 
     // The models along the centres above and below, at every x of the strip.
-    const real right = (LANES(real, LANE_NUMBER) + (x0 - cell_x * STEP + 0.5f)) / STEP - 0.5f;
-    const int bx_0 = MAX(cell_x, 0), bx_1 = MIN(cell_x + 1, w - 1);
-    const int by_0 = MAX(cell_y, 0), by_1 = MIN(cell_y + 1, h - 1);
+    const real right = (LANES(real, FROM_CENTRE) + (x0 - cell_x * STEP + 0.5f)) / STEP - 0.5f;
     real above[(Q + 1) * C], down[(Q + 1) * C];
 #pragma unroll
-    for (int i = 0; i < (Q + 1) * C; ++i) {
-        global const float *row_0 = model + ((long)i * h + by_0) * pitch;
-        global const float *row_1 = model + ((long)i * h + by_1) * pitch;
-        above[i] = row_0[bx_0] + right * (row_0[bx_1] - row_0[bx_0]);
-        down[i] = row_1[bx_0] + right * (row_1[bx_1] - row_1[bx_0]) - above[i];
+    for (int side = 0; side < 2; ++side) {
+        const int by = CLAMP(cell_y + side, 0, h - 1);
+        const real from = LANES(real, LEFT_FACTOR), to = LANES(real, RIGHT_FACTOR);
+#pragma unroll
+        for (int i = 0; i < (Q + 1) * C; ++i) {
+            global const float *row = model + ((long)i * h + by) * pitch;
+            const real value = along(row, cell_x, w, right, from, to);
+            if (side == 0)
+                above[i] = value;
+            else
+                down[i] = value - above[i];
+        }
     }
 
     const int top = cell_y * STEP + STEP / 2;

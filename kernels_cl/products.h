@@ -3,8 +3,7 @@
 //
 // Defines: BLOCK, side of a block in pixels; WEIGHTED, if there is an image of weights, and MASKED, if
 // it holds booleans; LIGHT, if the target is an image of that many channels of which only the
-// brightness counts (C is 1 then), and BRIGHTNESS_0 to BRIGHTNESS_2, the weights of channels 0, 1, 2,
-// 3 = 0, ... in it.
+// brightness counts (C is 1 then).
 
 #if !defined(BLOCK) || BLOCK < 1
 #error "BLOCK, the side of a block in pixels, must be at least 1"
@@ -19,7 +18,6 @@ typedef float weight_t;
 #endif
 #define INSIDE(i) ((i) <= last ? 1.0f : 0.0f)
 
-#define BRIGHTNESS(c) ((c) % 3 == 0 ? BRIGHTNESS_0 : (c) % 3 == 1 ? BRIGHTNESS_1 : BRIGHTNESS_2)
 #ifdef LIGHT
 #define TARGETS LIGHT
 #else
@@ -65,10 +63,11 @@ INLINE real usable(
     return zero == 0 ? counts : (real)0;
 }
 
-// Adds the products of [1, X, Y] to the K sums; `one` is the weight where it is not 1.
+// Adds the products of [1, X, Y], times `one`, to the K sums. x and y are 0 where `one` is, and where
+// that is all it can be besides 1 it need not be multiplied in: FRACTIONS, if it can be more.
 INLINE void add_products(real *sums, real one, const real *x, const real *y)
 {
-#ifdef WEIGHTED
+#if defined(WEIGHTED) || defined(FRACTIONS)
 #define WEIGHTED_BY_ONE(v) (one * (v))
 #else
 #define WEIGHTED_BY_ONE(v) (v)

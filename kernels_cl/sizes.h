@@ -3,6 +3,8 @@
 // Defines, given by the host with -D:
 //   Q   number of guides, 0..16, without the constant 1
 //   C   number of target channels, 1..9
+//   BRIGHTNESS_0 to BRIGHTNESS_2, for adaptive FLR only   weights of the target's channels 0, 1, 2,
+//       and again of 3, 4, 5 and so on, in the brightness
 //
 // Layouts, in C order:
 //   target (H, W, C)   guides_i (H, W, PART_i)   weight (H, W)   output (H, W, C)
@@ -26,3 +28,4 @@
 #define XX(i, j) ((i) * ((i) + 1) / 2 + (j))
 #define XY(i, c) ((Q + 1) * (Q + 2) / 2 + (i) * C + (c))
 #define K XY(Q + 1, 0)
+#define BRIGHTNESS(c) ((c) % 3 == 0 ? BRIGHTNESS_0 : (c) % 3 == 1 ? BRIGHTNESS_1 : BRIGHTNESS_2)

@@ -34,7 +34,8 @@ typedef uint4 bits;
 #define LANE(v, n) ((n) == 0 ? (v).s0 : (n) == 1 ? (v).s1 : (n) == 2 ? (v).s2 : (v).s3)
 #define AS_BITS as_uint4
 #define AS_REAL as_float4
-INLINE float lane_sum(real v) { return (v.s0 + v.s1) + (v.s2 + v.s3); }
+INLINE float half_sum(float2 v) { return v.x + v.y; }
+INLINE float lane_sum(real v) { return half_sum(v.lo + v.hi); }
 #else
 typedef float8 real;
 typedef int8 mask;
@@ -45,12 +46,12 @@ typedef uint8 bits;
      (v).s4 : (n) == 5 ? (v).s5 : (n) == 6 ? (v).s6 : (v).s7)
 #define AS_BITS as_uint8
 #define AS_REAL as_float8
-INLINE float lane_sum(real v)
+INLINE float half_sum(float4 v)
 {
-    const float4 half_sum = v.lo + v.hi;
-    const float2 pair = half_sum.lo + half_sum.hi;
+    const float2 pair = v.lo + v.hi;
     return pair.x + pair.y;
 }
+INLINE float lane_sum(real v) { return half_sum(v.lo + v.hi); }
 #endif
 
 #define LANE_NUMBER(i) (i)

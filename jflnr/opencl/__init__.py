@@ -1,7 +1,8 @@
 """The deployment kernels of kernels_cl/ and their host side; pyopencl is imported on first use."""
 
+from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
 from jflnr.opencl.devices import NoDevice, all_devices
 from jflnr.opencl.regression import flr
 
-__all__ = ["Context", "NoDevice", "all_devices", "flr"]
+__all__ = ["Context", "NoDevice", "all_devices", "flr", "flr_adaptive"]

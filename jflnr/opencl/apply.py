@@ -16,21 +16,27 @@ def apply(
     step: int,
     size: tuple[int, int],
     output: Any,
+    restored: tuple[Any, Any] | None = None,
 ) -> None:
     """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
 
     model: `(Q + 1, C, h, pitch)`, from `solve`. guides: each `(H, W, Q_i)`. shift: `(max(Q, 1),)`.
     step: distance of the models in pixels. size: blocks down and across, `(h, w)`. output:
-    `(H, W, C)`, float32 or float16, is written.
+    `(H, W, C)`, float32 or float16, is written. restored: from `energy.restore`, or None.
     """
     height, width, channels = output.shape
     h, w = size
-    lanes = context.width(step)
+    lanes = context.width(step, across=True)
     defines = {**guide_defines(guides, channels), "STEP": step, "WIDTH": lanes}
     if output.dtype == "float16":
         defines["HALF_OUTPUT"] = 1
-    arguments = (
+    arguments = [
         width, height, h, w, model.shape[3], model, *guide_arguments(guides), shift, output
-    )  # fmt: skip
-    strips = (w + 1) * -(-step // lanes)
+    ]  # fmt: skip
+    if restored is not None:
+        rate, brightness = restored
+        defines["RESTORED"] = 1
+        arguments += [brightness.shape[1], rate, brightness]
+    # A vector lies in a cell between four block centres, or covers several side by side.
+    strips = -(-(w + 1) // max(lanes // step, 1)) * -(-step // lanes)
     context.run("apply", "apply.cl", defines, (strips, h + 1), arguments)

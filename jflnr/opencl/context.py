@@ -46,11 +46,15 @@ class Context:
         self._kernels: dict[tuple[Any, ...], Any] = {}
         self._in_use: list[np.ndarray] = []
 
-    def width(self, block: int | None = None) -> int:
-        """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given."""
+    def width(self, block: int | None = None, across: bool = False) -> int:
+        """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given.
+
+        across: they may also be several whole blocks.
+        """
         if not self.on_cpu:
             return 1
-        return next(n for n in (8, 4, 1) if block is None or block % n == 0)
+        fits = lambda n: block is None or block % n == 0 or (across and n % block == 0)
+        return next(n for n in (8, 4, 1) if fits(n))
 
     def run(
         self,

@@ -6,6 +6,7 @@ from typing import Any
 
 from jflnr.flr.moments import plane_count
 from jflnr.opencl.context import Context
+from jflnr.opencl.grids import brightness_defines
 
 PARTS = 5
 
@@ -29,6 +30,16 @@ def weight_defines(weight: Any | None) -> dict[str, int]:
     if weight is None:
         return {}
     return {"WEIGHTED": 1, "MASKED": 1} if weight.dtype == bool else {"WEIGHTED": 1}
+
+
+def pixel_defines(
+    target: Any, guides: tuple[Any, ...], weight: Any | None, block: int
+) -> dict[str, int]:
+    """The defines of kernels_cl/products.h for a target `(H, W, C)`, guides and weights."""
+    defines = guide_defines(guides, target.shape[2]) | weight_defines(weight) | {"BLOCK": block}
+    if target.dtype == "float16":
+        defines["HALF_TARGET"] = 1
+    return defines
 
 
 def centre(context: Context, guides: tuple[Any, ...], weight: Any | None = None) -> Any:
@@ -59,21 +70,21 @@ def collect(
     shift: Any,
     block: int,
     weight: Any | None = None,
+    light: bool = False,
 ) -> Any:
     """Mean over each block of the outer products of [1, X - shift, Y] (section 3.2, kernel 1).
 
     target: `(H, W, C)`. guides: each `(H, W, Q_i)`. shift: from `centre`. weight: `(H, W)`,
-    float32 or bool, or None. All are device arrays.
+    float32 or bool, or None. All are device arrays. light: take the brightness for Y (C = 1).
     Returns `(K, ceil(H/block), pitch)`, zero from column ceil(W/block) on.
     """
-    height, width, channels = target.shape
-    defines = {**guide_defines(guides, channels), "BLOCK": block, "WIDTH": context.width(block)}
-    if target.dtype == "float16":
-        defines["HALF_TARGET"] = 1
-    defines |= weight_defines(weight)
+    height, width = target.shape[:2]
+    defines = pixel_defines(target, guides, weight, block) | {"WIDTH": context.width(block)}
+    if light:
+        defines |= brightness_defines(target.shape[2]) | {"C": 1, "LIGHT": target.shape[2]}
     h, w = -(-height // block), -(-width // block)
     pitch = -(-w // context.width()) * context.width()
-    moments = context.empty((plane_count(defines["Q"], channels), h, pitch))
+    moments = context.empty((plane_count(defines["Q"], defines["C"]), h, pitch))
     arguments = (
         width, height, h, pitch, target, *guide_arguments(guides), weight, shift, moments
     )  # fmt: skip

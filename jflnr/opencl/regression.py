@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import jax
-import numpy as np
 
 from jflnr.flr.arguments import channel_count, check_regression
 from jflnr.flr.parameters import Parameters
 from jflnr.opencl.apply import apply
+from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
 from jflnr.opencl.blur import blur
-from jflnr.opencl.context import Context, default_context, is_device_array
-from jflnr.opencl.moments import PARTS, centre, collect
+from jflnr.opencl.context import Context, default_context
+from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.solve import solve
-
-MOST = {"guides": 16, "target": 9}
 
 
 def flr(
@@ -45,80 +43,24 @@ def flr(
     """
     context = default_context() if context is None else context
     factor = check_regression(target, guides, guides_map, weight, block, support)
-    y, channels = context.array(_image(target)), target.shape[2]
-    x, count = _layers(context, guides), channel_count(guides)
-    _check_counts(count, channels)
-    x_map = x if guides_map is None else _layers(context, guides_map)
-    output, result = _output(context, _shape(target, guides_map), out, on_device)
+    y, channels = context.array(to_image(target)), target.shape[2]
+    x, count = to_layers(context, guides), channel_count(guides)
+    check_counts(count, channels)
+    x_map = x if guides_map is None else to_layers(context, guides_map)
+    output, result = to_output(context, _shape(target, guides_map), out, on_device)
 
-    counts = _weight(context, weight)
+    counts = to_weight(context, weight)
     shift = centre(context, x, counts)
     moments = collect(context, y, x, shift, block, counts)
     step = block * factor
-    moments = blur(context, moments, float(parameters.sigma) / step, reach=-(-support // step))
-    model = solve(context, moments, shift, parameters, count, channels)
     size = -(-target.shape[0] // block), -(-target.shape[1] // block)
+    reach = min(-(-support // step), max(size))
+    moments = blur(context, moments, float(parameters.sigma) / step, reach)
+    model = solve(context, moments, shift, parameters, count, channels)
     apply(context, model, x_map, shift, step, size, output)
     return context.finish(output, result)
-
-
-def _check_counts(guides: int, channels: int) -> None:
-    for name, count in (("guides", guides), ("target", channels)):
-        if count > MOST[name]:
-            raise ValueError(
-                f"{name} has {count} channels; the opencl backend takes at most {MOST[name]}"
-            )
 
 
 def _shape(target: Any, guides_map: Any | None) -> tuple[int, int, int]:
     layers = [] if guides_map is None else jax.tree.leaves(guides_map)
     return (*(layers[0] if layers else target).shape[:2], target.shape[2])
-
-
-def _image(values: Any) -> Any:
-    """As the kernels can read it: float16 or float32, in C order, a device array as it is."""
-    if is_device_array(values):
-        return values
-    array = np.asarray(values)
-    dtype = np.float16 if array.dtype == np.float16 else np.float32
-    return np.require(array, dtype, ["C", "ALIGNED"])
-
-
-def _layers(context: Context, guides: Any) -> tuple[Any, ...]:
-    """The guides as at most `PARTS` device arrays of one type, none of them without channels."""
-    layers = [_image(layer) for layer in jax.tree.leaves(guides) if layer.shape[2]]
-    if len({layer.dtype for layer in layers}) > 1:
-        layers = [layer.astype(np.float32) for layer in layers]
-    if len(layers) > PARTS:
-        layers = [*layers[: PARTS - 1], np.concatenate(layers[PARTS - 1 :], axis=2)]
-    return tuple(context.array(layer) for layer in layers)
-
-
-def _weight(context: Context, weight: Any | None) -> Any | None:
-    if weight is None or is_device_array(weight):
-        return weight
-    array = np.asarray(weight)
-    dtype = bool if array.dtype == bool else np.float32
-    return context.array(np.require(array, dtype, ["C", "ALIGNED"]))
-
-
-def _output(
-    context: Context, shape: tuple[int, int, int], out: Any | None, on_device: bool
-) -> tuple[Any, Any]:
-    """The device array to write to, and what the caller gets: that array or a numpy array."""
-    if out is None and on_device:
-        output = context.empty(shape)
-        return output, output
-    result = np.empty(shape, np.float32) if out is None else out
-    if result.shape != shape or result.dtype not in (np.float32, np.float16):
-        raise ValueError(
-            f"out must be a float32 or float16 array of shape {shape}; "
-            f"got {result.dtype} of shape {result.shape}"
-        )
-    if is_device_array(result):
-        return result, result
-    if not (result.flags.c_contiguous and result.flags.writeable and result.flags.aligned):
-        raise ValueError("out must be writable, aligned and in C order")
-    if context.on_cpu:
-        return context.array(result, writable=True), result
-    return context.empty(shape, result.dtype), result

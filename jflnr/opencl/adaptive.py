@@ -1,0 +1,107 @@
+"""Adaptive FLR on an OpenCL device: the steps of jflnr/flr/adaptive.py (docs/adaptive.md)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import jax
+
+from jflnr import checks
+from jflnr.flr.adaptive import BLOCK, LEVELS
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
+from jflnr.flr.arguments import channel_count, check_regression
+from jflnr.opencl.apply import apply
+from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
+from jflnr.opencl.context import Context, default_context
+from jflnr.opencl.energy import frame_mean, rescale, restore
+from jflnr.opencl.grids import Grid, Run
+from jflnr.opencl.level import Models, fit_level
+from jflnr.opencl.merge import merge, signal_share
+from jflnr.opencl.moments import centre, collect
+from jflnr.opencl.pyramid import halve, halve_grid
+from jflnr.opencl.weighted_moments import collect_weighted
+
+
+def flr_adaptive(
+    target: Any,
+    guides: Any,
+    parameters: AdaptiveParameters,
+    *,
+    block: int = BLOCK,
+    levels: int = LEVELS,
+    weight: Any | None = None,
+    keep_energy: bool = False,
+    context: Context | None = None,
+    out: Any | None = None,
+    on_device: bool = False,
+) -> Any:
+    """`jflnr.flr.adaptive.flr_adaptive` on an OpenCL device: same arguments, same result.
+
+    target, guides and weight may be arrays of numpy or JAX, or device arrays; context, out and
+    on_device: as in `jflnr.opencl.flr`.
+    Returns `(H, W, C)`, float32 unless `out` is given.
+
+    Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
+    """
+    context = default_context() if context is None else context
+    check_regression(target, guides, None, weight, block, 1)
+    checks.positive_integer("levels", levels)
+    check_counts(channel_count(guides), target.shape[2])
+    output, result = to_output(context, target.shape, out, on_device)
+    images = context.array(to_image(target)), to_layers(context, guides)
+    counts = to_weight(context, weight)
+    image = context.empty(target.shape) if keep_energy else output
+    _denoise(context, *images, counts, parameters, max(block // 2, 1), levels, image)
+    if keep_energy:
+        rescale(context, image, images[0], counts, output)
+    return context.finish(output, result)
+
+
+def _denoise(
+    context: Context,
+    target: Any,
+    guides: tuple[Any, ...],
+    weight: Any | None,
+    parameters: AdaptiveParameters,
+    block: int,
+    levels: int,
+    image: Any,
+) -> None:
+    """The three passes over the pixels, and what happens on blocks between them; writes `image`.
+
+    block: side in pixels of the finest blocks.
+    """
+    count, channels, w = channel_count(guides), target.shape[2], -(-target.shape[1] // (2 * block))
+    shift = centre(context, guides)
+    moments = collect(context, target, guides, shift, 2 * block, weight, light=True)
+    mean = frame_mean(context, moments, w, count)
+    numbers = jax.tree.map(lambda number: math.exp(float(number)), parameters)
+    run = Run(context, count, channels, numbers, shift, mean)
+    pilot = fit_pilot(run, moments, w, block)
+    grid = collect_weighted(run, target, guides, pilot, weight, block)
+    merged = fit_pyramid(run, grid, levels)
+    restored = restore(run, merged, moments, w)
+    size = grid.h, grid.w
+    apply(context, merged.coefficients, guides, shift, block, size, image, restored)
+
+
+def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Models:
+    """Models of the brightness on blocks of 4 `block`, from the moments of pass 1 with w columns."""
+    run = run._replace(channels=1)
+    return fit_level(run, Grid(halve(run, moments, w), -(-w // 2), 4 * block)).models
+
+
+def fit_pyramid(run: Run, grid: Grid, levels: int) -> Models:
+    """Models of the finest grid, put together from all levels."""
+    grids = [grid]
+    for _ in range(levels - 1):
+        grids.append(halve_grid(run, grids[-1]))
+    coarse = fit_level(run, grids[-1])
+    merged = coarse.models
+    for grid in reversed(grids[:-1]):
+        fine = fit_level(run, grid, merged)
+        share = signal_share(run, grid, fine, coarse)
+        merged = merge(run, fine.models, coarse.models, merged, share)
+        coarse = fine
+    return merged

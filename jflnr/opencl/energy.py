@@ -1,0 +1,60 @@
+"""Host side of kernels_cl/energy.cl and rescale.cl; its twin in JAX is jflnr/flr/energy.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jflnr.opencl.context import Context
+from jflnr.opencl.grids import Run, brightness_defines
+from jflnr.opencl.level import Models
+from jflnr.opencl.moments import pixel_defines
+
+
+def frame_mean(context: Context, moments: Any, w: int, guides: int) -> Any:
+    """Mean brightness of the usable pixels, 1 if there is no light, and the sum of blocks, `(2,)`.
+
+    moments: `(K, h, pitch)`, of the brightness, with w columns. guides: the number Q.
+    """
+    h, pitch = moments.shape[1:]
+    partial, mean = context.empty((h, 2)), context.empty((2,))
+    defines = {"Q": guides, "C": 1, "WIDTH": 1}
+    context.run("light_rows", "energy.cl", defines, (h,), (h, w, pitch, moments, partial))
+    context.run("light_mean", "energy.cl", defines, (1,), (h, partial, mean))
+    return mean
+
+
+def restore(run: Run, merged: Models, moments: Any, w: int) -> tuple[Any, Any]:
+    """What the models are to be scaled by, as `apply` takes it: rate and brightness of blocks.
+
+    merged: the models of the finest grid. moments: of pass 1, on blocks twice as large, with w
+    columns. Returns `(1,)` and `(h, pitch)`.
+    """
+    context, defines = run.context, {"Q": run.guides, "C": 1, "WIDTH": 1}
+    h, pitch = moments.shape[1:]
+    output, partial, rate = (context.empty(shape) for shape in ((h, pitch), (h, 2), (1,)))
+    arguments = (h, w, pitch, *merged.sizes, moments, merged.light, output)
+    context.run("restored", "energy.cl", defines, (w, h), arguments)
+    arguments = (h, w, pitch, moments, output, partial)
+    context.run("restored_rows", "energy.cl", defines, (h,), arguments)
+    arguments = (h, run.numbers.slack, partial, run.mean, rate)
+    context.run("restore", "energy.cl", defines, (1,), arguments)
+    return rate, output
+
+
+def rescale(context: Context, image: Any, target: Any, weight: Any | None, output: Any) -> None:
+    """Scale the result so that its brightness sums to the input's over the pixels that count.
+
+    image: `(H, W, C)` float32. target: `(H, W, C)`. weight: `(H, W)` or None. output: `(H, W, C)`,
+    float32 or float16, is written; it may be `image`.
+    """
+    height, width, channels = image.shape
+    partial, ratio = context.empty((height, 2)), context.empty((1,))
+    defines = pixel_defines(target, (), weight, 1) | brightness_defines(channels)
+    defines["WIDTH"] = context.width()
+    if output.dtype == "float16":
+        defines["HALF_OUTPUT"] = 1
+    arguments = (width, height, target, image, weight, partial)
+    context.run("energy_rows", "rescale.cl", defines, (height,), arguments)
+    context.run("energy_ratio", "rescale.cl", defines, (1,), (height, partial, ratio))
+    strips = -(-image.size // defines["WIDTH"])
+    context.run("rescale", "rescale.cl", defines, (strips,), (image.size, ratio, image, output))

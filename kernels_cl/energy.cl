@@ -1,0 +1,86 @@
+// Adaptive FLR: the mean brightness of the frame, and keeping it in spite of the weights.
+
+#include "vectors.h"
+#include "sizes.h"
+
+// Sums in three steps, the same in any order of work-groups: rows, then their total.
+#define SUM(index)                                        \
+    float total_##index = 0;                              \
+    for (int y = 0; y < h; ++y) total_##index += partial[2 * y + index];
+
+// The moments of pass 1: partial (h, 2), how much there is of each row of blocks and its brightness.
+// Global size (h).
+kernel void light_rows(int h, int w, int pitch, global const float *moments, global float *partial)
+{
+    const int y = get_global_id(0);
+    if (y >= h) return;
+    global const float *n = moments + (long)y * pitch, *light = n + (long)XX(Q + 1, 0) * h * pitch;
+    float pixels = 0, sum = 0;
+    for (int x = 0; x < w; ++x) {
+        pixels += n[x];
+        sum += light[x];
+    }
+    partial[2 * y] = pixels;
+    partial[2 * y + 1] = sum;
+}
+
+// mean: the frame's mean brightness, or 1 where there is no light, and the sum. One work-item.
+kernel void light_mean(int h, global const float *partial, global float *mean)
+{
+    if (get_global_id(0) > 0) return;
+    SUM(0)
+    SUM(1)
+    const float ratio = total_1 / MAX(total_0, 1e-12f);
+    mean[0] = ratio > 0 ? ratio : 1;
+    mean[1] = total_1;
+}
+
+// Brightness (h, pitch) of the merged models on the blocks of pass 1: the mean of 2 x 2 models
+// `light` (Q + 1, fine_h, fine_pitch), at the mean guides. Global size (w, h).
+kernel void restored(
+    int h, int w, int pitch, int fine_h, int fine_w, int fine_pitch, global const float *moments,
+    global const float *light, global float *output)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= w || y >= h) return;
+    const long block = (long)y * pitch + x, plane = (long)h * pitch;
+    const int x_1 = MIN(2 * x + 1, fine_w - 1), y_1 = MIN(2 * y + 1, fine_h - 1);
+    const float per_pixel = moments[block] > 1e-12f ? 1 / moments[block] : 0;
+    float sum = 0;
+    for (int q = 0; q <= Q; ++q) {
+        const float guide = q == 0 ? 1 : moments[XX(q, 0) * plane + block] * per_pixel;
+        global const float *upper = light + ((long)q * fine_h + 2 * y) * fine_pitch;
+        global const float *lower = light + ((long)q * fine_h + y_1) * fine_pitch;
+        sum += guide * (upper[2 * x] + upper[x_1] + lower[2 * x] + lower[x_1]) / 4;
+    }
+    output[block] = MAX(sum, 0);
+}
+
+// partial (h, 2): sums over each row of the brightness that is put out, and of its square.
+kernel void restored_rows(
+    int h, int w, int pitch, global const float *moments, global const float *output,
+    global float *partial)
+{
+    const int y = get_global_id(0);
+    if (y >= h) return;
+    float sum = 0, squares = 0;
+    for (int x = 0; x < w; ++x) {
+        const float n = moments[(long)y * pitch + x], value = output[(long)y * pitch + x];
+        sum += n * value;
+        squares += n * value * value;
+    }
+    partial[2 * y] = sum;
+    partial[2 * y + 1] = squares;
+}
+
+// rate: the models are to be multiplied by max(1 + rate * output, 0) block by block, so that the
+// frame's sum comes within `slack` of the input's. One work-item.
+kernel void restore(
+    int h, float slack, global const float *partial, global const float *mean, global float *rate)
+{
+    if (get_global_id(0) > 0) return;
+    SUM(0)
+    SUM(1)
+    const float wanted = CLAMP(total_0, (1 - slack) * mean[1], (1 + slack) * mean[1]);
+    rate[0] = (wanted - total_0) / (total_1 > 0 ? total_1 : 1);
+}

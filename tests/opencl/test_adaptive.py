@@ -1,0 +1,146 @@
+"""Adaptive FLR in OpenCL against JAX in float64: numbers of guides and channels, awkward frames."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from jflnr.flr.adaptive import flr_adaptive as jax_adaptive
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.opencl import Context, flr_adaptive
+from tests.opencl import tolerances
+from tests.opencl.conftest import error, in_float64, scene
+
+SIZE = (61, 203)
+PARAMETERS = ADAPTIVE_DEFAULT.but(exponent=0.8)
+
+
+@functools.cache
+def by_jax(**options: Any) -> Callable[..., np.ndarray]:
+    return in_float64(jax_adaptive, parameters=PARAMETERS, **options)
+
+
+def everywhere() -> np.ndarray:
+    return np.ones(SIZE, np.float32)
+
+
+def compare(
+    context: Context, target: np.ndarray, guides: Any, weight: np.ndarray, **options: Any
+) -> float:
+    found = flr_adaptive(target, guides, PARAMETERS, weight=weight, context=context, **options)
+    weight = weight.astype(np.float32)
+    return error(found, by_jax(**options)(target, guides, weight=weight))
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 8])
+def test_numbers_of_guides(context: Context, count: int) -> None:
+    """Against one JAX program: a guide that is zero changes nothing."""
+    target, guides = scene(*SIZE, 8, 3)
+    found = flr_adaptive(target, guides[..., :count], PARAMETERS, context=context)
+    fewer = np.where(np.arange(8) < count, guides, 0)
+    right = by_jax()(target, fewer, weight=everywhere())
+    assert error(found, right) < tolerances.ADAPTIVE
+
+
+@pytest.mark.parametrize("kind", ["numbers", "mask"])
+def test_weights_and_spoiled_pixels(context: Context, kind: str) -> None:
+    target, guides = scene(*SIZE, 8, 3)
+    weight = np.random.default_rng(0).uniform(-0.5, 1, SIZE).astype(np.float32)
+    weight[:24, :70] = 0
+    weight[3, 104:107] = np.nan, np.inf, 0
+    target[30, 31], target[31, 150, 1], guides[32, 33, 1] = np.nan, np.inf, np.nan
+    weight = weight > 0 if kind == "mask" else weight
+    assert compare(context, target, guides, weight) < tolerances.ADAPTIVE
+
+
+def test_no_light(context: Context) -> None:
+    target, guides = scene(*SIZE, 8, 3)
+    assert not flr_adaptive(np.zeros_like(target), guides, PARAMETERS, context=context).any()
+    target[:, :100] = 0
+    assert compare(context, target, guides, everywhere()) < tolerances.ADAPTIVE
+
+
+def test_nothing_usable_gives_zero(context: Context) -> None:
+    target, guides = scene(20, 30, 5, 3)
+    assert not flr_adaptive(np.full_like(target, np.nan), guides, PARAMETERS, context=context).any()
+
+
+def test_energy_is_kept(context: Context) -> None:
+    target, guides = scene(*SIZE, 8, 3)
+    weight = everywhere() * (np.arange(203) > 20)
+    target[40, 50] = np.inf
+    found = flr_adaptive(
+        target, guides, PARAMETERS, weight=weight, keep_energy=True, context=context
+    )
+    counts = np.isfinite(target).all(2) & (weight > 0)
+    luminance = np.array([0.2126, 0.7152, 0.0722])
+    before, after = (np.sum(image[counts] @ luminance) for image in (target, found))
+    assert abs(after / before - 1) < 1e-5
+    plain = flr_adaptive(target, guides, PARAMETERS, weight=weight, context=context)
+    assert np.ptp(found / plain) < 1e-5  # one factor for the whole frame
+
+
+def test_light_groups_sum_to_the_sum(context: Context) -> None:
+    target, guides = scene(*SIZE, 5, 6)
+    groups = flr_adaptive(target, guides, PARAMETERS, context=context)
+    total = target[..., :3] + target[..., 3:]
+    found = flr_adaptive(total, guides, PARAMETERS, context=context)
+    assert error(groups[..., :3] + groups[..., 3:], found) < tolerances.ADAPTIVE
+
+
+@pytest.mark.parametrize(("size", "block"), [((1, 1), 8), ((9, 13), 8), ((33, 70), 2)])
+def test_sizes_and_blocks(context: Context, size: tuple[int, int], block: int) -> None:
+    target, guides = scene(*size, 2, 1)
+    weight = np.ones(size, np.float32)
+    assert compare(context, target, guides, weight, block=block, levels=3) < tolerances.ADAPTIVE
+
+
+@pytest.mark.parametrize("block", [6, 12, 16, 24, 32])
+def test_vectors_and_blocks_of_every_kind(context: Context, gpu_like: Context, block: int) -> None:
+    """Vectors across two blocks, one block, a part of it: the same as pixel by pixel."""
+    target, guides = scene(*SIZE, 3, 4)
+    found, right = (
+        flr_adaptive(target, guides, PARAMETERS, block=block, context=c)
+        for c in (context, gpu_like)
+    )
+    assert error(found, right) < tolerances.ADAPTIVE
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_driven_as_a_gpu(context: Context, gpu_like: Context, dtype: type) -> None:
+    target, guides = (image.astype(dtype) for image in scene(*SIZE, 5, 3))
+    layers = tuple(np.ascontiguousarray(a) for a in np.split(guides, [3, 4], axis=2))
+    found = flr_adaptive(target, layers, PARAMETERS, keep_energy=True, context=gpu_like)
+    right = flr_adaptive(
+        np.float32(target), np.float32(guides), PARAMETERS, keep_energy=True, context=context
+    )
+    assert error(found, right) < tolerances.ADAPTIVE
+
+
+def test_three_runs_give_equal_bits(context: Context) -> None:
+    target, guides = scene(*SIZE, 5, 3)
+    runs = [flr_adaptive(target, guides, PARAMETERS, context=context) for _ in range(3)]
+    assert runs[0].tobytes() == runs[1].tobytes() == runs[2].tobytes()
+
+
+def test_result_on_the_device_and_in_half(context: Context) -> None:
+    target, guides = scene(*SIZE, 5, 3)
+    right = flr_adaptive(target, guides, PARAMETERS, context=context)
+    there = [context.array(a) for a in (target, guides)]
+    found = flr_adaptive(*there, PARAMETERS, context=context, on_device=True)
+    np.testing.assert_array_equal(found.get(), right)
+    out = np.empty(target.shape, np.float16)
+    for keep_energy in (False, True):
+        flr_adaptive(target, guides, PARAMETERS, context=context, out=out, keep_energy=keep_energy)
+        right = flr_adaptive(target, guides, PARAMETERS, context=context, keep_energy=keep_energy)
+        np.testing.assert_array_equal(out, right.astype(np.float16))
+
+
+def test_wrong_arguments(context: Context) -> None:
+    target, guides = scene(20, 30, 5, 3)
+    with pytest.raises(ValueError, match="levels"):
+        flr_adaptive(target, guides, PARAMETERS, context=context, levels=0)
+    with pytest.raises(ValueError, match="guides has 17 channels"):
+        flr_adaptive(target, np.zeros((20, 30, 17), np.float32), PARAMETERS, context=context)
