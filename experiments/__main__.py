@@ -11,6 +11,7 @@ from experiments import results
 
 NAMES = (
     "picture",
+    "steps",
     "gain",
     "speed",
     "ablation",

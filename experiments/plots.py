@@ -20,11 +20,14 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#0
 
 
 @contextmanager
-def figure(path: Path, columns: int = 1, size: tuple[float, float] = (5.5, 4)) -> Iterator[Any]:
-    """Axes side by side, written to `path` when the block ends."""
-    shape = (size[0] * columns, size[1])
-    drawing, axes = plt.subplots(1, columns, figsize=shape, layout="constrained")
-    for axis in axes if columns > 1 else [axes]:
+def figure(
+    path: Path, columns: int = 1, size: tuple[float, float] = (5.5, 4), rows: int = 1
+) -> Iterator[Any]:
+    """Axes side by side, row after row, written to `path` when the block ends."""
+    shape = (size[0] * columns, size[1] * rows)
+    drawing, grid = plt.subplots(rows, columns, figsize=shape, layout="constrained", squeeze=False)
+    axes = grid.ravel() if grid.size > 1 else grid[0, 0]
+    for axis in grid.flat:
         axis.set_prop_cycle(color=COLOURS)
         axis.grid(True, which="major", alpha=0.3)
     yield axes

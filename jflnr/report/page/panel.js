@@ -100,7 +100,7 @@ function number(value) {
   if (typeof value !== "number") return value == null ? "–" : String(value);
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "NaN" : value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
-  if (Number.isInteger(value) && size < 1e5) return String(value);
+  if (Number.isInteger(value) && size < 1e9) return String(value);
   return (size < 1e-3 || size >= 1e5) ? value.toExponential(2) : value.toPrecision(4);
 }
 

@@ -86,7 +86,7 @@ function buildChart() {
     maintainAspectRatio: false, animation: false,
     scales: { x: { type: "logarithmic", title: { display: true, text: CONTENT.labels[x] } },
       y: { title: { display: true, text: "" } } },
-    plugins: { tooltip: { callbacks: { label: ({ raw }) => raw.name &&
+    plugins: { legend: { labels: { usePointStyle: true } }, tooltip: { callbacks: { label: ({ raw }) => raw.name &&
       `${raw.name}: ${number(raw.y)} in ${number(raw.x)} ${CONTENT.labels[x]}` } } },
   } });
   const show = () => {

@@ -1,0 +1,64 @@
+"""The site builds without a warning, and its code blocks run as they stand."""
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from sybil import Document, Example
+from sybil.parsers import markdown
+
+from jflnr.cli import main
+from jflnr.frame import Frame, write_frame
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def test_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    method = (tmp_path / "method" / "index.html").read_text()
+    assert "<math" in method and "arithmatex" not in method
+    assert "demodulated indirect radiance" in (tmp_path / "reference" / "index.html").read_text()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_block_has_a_language(page: Path) -> None:
+    """A block without one would not be run, and nobody would notice."""
+    fences = [line for line in page.read_text().splitlines() if line.startswith("```")]
+    assert all(len(line) > 3 for line in fences[::2]), page
+    assert len(fences) % 2 == 0
+
+
+@pytest.fixture
+def folder(tmp_path: Path, frame: Frame, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the pages' blocks run: frames under the names that they use."""
+    for name in ("room.exr", "frames/a.exr", "frames/b.exr", "shot/room.exr"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        write_frame(tmp_path / name, frame)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run_shell(example: Example) -> None:
+    """Each line of a shell block; `jflnr` in this process, which is quick."""
+    for line in example.parsed.splitlines():
+        words = shlex.split(line, comments=True)
+        if words[:1] == ["jflnr"]:
+            assert main(words[1:]) == 0, line
+        elif words:
+            subprocess.run(["bash", "-euc", line], check=True)
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_blocks_run(page: Path) -> None:
+    """All but those after `<!-- skip: next -->`, which need hours, a network or a GPU."""
+    parsers = [markdown.PythonCodeBlockParser(), markdown.CodeBlockParser("bash", run_shell)]
+    document = Document.parse(str(page), *parsers, markdown.SkipParser())
+    for example in document.examples():
+        example.evaluate()
