@@ -9,6 +9,7 @@ import contextlib
 import io
 import os
 import struct
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -48,6 +49,7 @@ class Attributes(NamedTuple):
     parts: int
     window: Window
     others: dict[str, Any]  # as the program that wrote the file named them
+    size: tuple[int, int]  # height and width in pixels
 
 
 def layer_of(channel: str) -> str:
@@ -67,7 +69,7 @@ def read_attributes(path: PathLike) -> Attributes:
     """Comments, compression and windows of the file's first part, without its pixels."""
     parts = _read_parts(Path(path), header_only=True)
     header = parts[0].header
-    (x0, y0), _ = header["dataWindow"]
+    (x0, y0), (x1, y1) = header["dataWindow"]
     low, high = header["displayWindow"]
     comments = header.get("comments")
     return Attributes(
@@ -76,6 +78,7 @@ def read_attributes(path: PathLike) -> Attributes:
         parts=len(parts),
         window=Window((int(x0), int(y0)), (int(low[0]), int(low[1]), int(high[0]), int(high[1]))),
         others={name: value for name, value in header.items() if name not in STRUCTURE},
+        size=(int(y1) - int(y0) + 1, int(x1) - int(x0) + 1),
     )
 
 
@@ -219,14 +222,36 @@ def _box(corners: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """Keep OpenEXR's own remarks off the terminal: it prints to stdout and, from C, to stderr."""
-    saved = os.dup(2)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    """Keep OpenEXR's own remarks off the terminal: it prints to stdout and, from C, to stderr.
+
+    Several threads may read and write at a time: the first closes both, the last opens them again.
+    """
+    with _lock:
+        if not _silent:
+            _hushed.append(_hush())
+        _silent.append(None)
     try:
-        os.dup2(nowhere, 2)
-        with contextlib.redirect_stdout(io.StringIO()):
-            yield
+        yield
     finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(nowhere)
+        with _lock:
+            _silent.pop()
+            if not _silent:
+                _hushed.pop().close()
+
+
+_lock = threading.Lock()
+_silent: list[None] = []  # one entry for each thread that wants silence
+_hushed: list[contextlib.ExitStack] = []
+
+
+def _hush() -> contextlib.ExitStack:
+    """Close both; what opens them again."""
+    stack = contextlib.ExitStack()
+    saved = os.dup(2)
+    stack.callback(os.close, saved)
+    stack.callback(os.dup2, saved, 2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+    return stack

@@ -28,7 +28,8 @@ def assemble(source: Source) -> Layers:
     there = {name for name in names if any(channel in channels for channel in names[name])}
 
     def read(name: str) -> np.ndarray:
-        return layer(channels, name, names[name], str(source.path), layout.advice.get(name, ""))
+        advice = layout.advice.get(name, "")
+        return layer(channels, name, names[name], str(source.path), advice, source.part)
 
     camera = Camera.of(source.attributes.others | source.header)
     needed = {layout.light, *GUIDES}

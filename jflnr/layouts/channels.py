@@ -63,12 +63,13 @@ def layer(
     names: tuple[str, ...],
     source: str,
     advice: str = "",
+    part: bool = False,
 ) -> np.ndarray:
     """Layer `name` of a Frame, float32 (H, W, C), from the channels `names`.
 
     Three channels make a layer of one by their mean, one makes a layer of three by repetition.
     Raises ValueError, naming `source`, if channels are missing or no value is finite; `advice`
-    says what to do about a missing layer.
+    says what to do about a missing layer. part: of the image, which may well be all sky.
     """
     stem = layer_of(names[0]) or ", ".join(names)
     missing = [channel for channel in names if channel not in channels]
@@ -77,7 +78,7 @@ def layer(
     if missing:
         raise ValueError(f"{source}: layer {stem} lacks its channel {', '.join(missing)}")
     image = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
-    if not np.isfinite(image).any():
+    if not part and not np.isfinite(image).any():
         raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
     count = len(LAYERS.get(name, "RGB"))
     if count == 1 < len(names):

@@ -15,12 +15,16 @@ from jflnr.layouts.override import override
 
 @dataclass(frozen=True)
 class Source:
-    """What `load` found: every channel (H, W) in its own type, the header, and the layout."""
+    """What `load` found: every channel (H, W) in its own type, the header, and the layout.
+
+    part: only some of the file's rows and channels are here.
+    """
 
     path: Path
     channels: dict[str, np.ndarray]
     attributes: exr.Attributes
     layout: Layout
+    part: bool = False
 
     @property
     def header(self) -> dict:

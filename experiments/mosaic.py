@@ -1,0 +1,43 @@
+"""Large frames made of real ones, side by side and mirrored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import jflnr
+from experiments import data
+from jflnr.large.scanlines import writing
+from jflnr.layouts.channels import LAYERS
+
+PARTS = ("indirect", "albedo", "normal", "depth", "ao", "mask")
+
+
+def names() -> dict[str, list[str]]:
+    """Layer to channel names, as in our own files."""
+    stems = {part: "indirect_1" if part == "indirect" else part for part in PARTS}
+    return {part: [f"{stem}.{c}" for c in LAYERS[part]] for part, stem in stems.items()}
+
+
+def write(path: Path, height: int, width: int) -> None:
+    """A frame of any size with the layers `PARTS`, as half, in strips as high as a real frame."""
+    frames = [layers(jflnr.read_frame(found)) for found in data.frames("train", "val", "test")]
+    rows, columns, _ = frames[0].shape
+    channels = [channel for group in names().values() for channel in group]
+    with writing(path, (height, width), channels, kind="half") as append:
+        for band, top in enumerate(range(0, height, rows)):
+            strip = strip_of(frames, band, -(-width // columns))[: height - top, :width]
+            append({name: strip[..., i] for i, name in enumerate(channels)})
+
+
+def strip_of(frames: list[np.ndarray], band: int, count: int) -> np.ndarray:
+    """`count` frames in a row, every other one mirrored; each band begins with another frame."""
+    chosen = [frames[(5 * band + i) % len(frames)][:, :: -1 if i % 2 else 1] for i in range(count)]
+    return np.concatenate(chosen, axis=1)[:: -1 if band % 2 else 1]
+
+
+def layers(frame: jflnr.Frame) -> np.ndarray:
+    """The layers `PARTS` of a frame side by side, `(H, W, 12)` float16."""
+    images = [getattr(frame, part) for part in PARTS]
+    return np.concatenate(images, axis=-1).astype(np.float16)

@@ -1,0 +1,134 @@
+"""EXR files read and written a few rows at a time, through OpenImageIO.
+
+OpenEXR's own Python module only knows whole files. Files of one part in scan lines can be read so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jflnr import exr, layouts
+from jflnr.files import replacing
+from jflnr.frame import Frame
+from jflnr.large.source import Rows
+from jflnr.layouts.override import override
+from jflnr.layouts.source import recognise
+
+# Rows that are decoded at a time; every compression packs a divisor of it together.
+BATCH = 64
+
+
+def _openimageio() -> Any:
+    try:
+        import OpenImageIO
+    except ImportError:
+        raise ImportError(
+            "the frame is larger than the memory it may take, and reading it in parts needs "
+            "OpenImageIO: pip install 'jflnr[large]', or raise --memory"
+        ) from None
+    return OpenImageIO
+
+
+class Scanlines:
+    """An open file: its size, attributes and layout, and any rows of its channels.
+
+    Raises ValueError for a file that can only be read whole, and OSError.
+    """
+
+    def __init__(self, path: Path, spp: int | None, names: Mapping[str, str]) -> None:
+        self.path, self.attributes = path, exr.read_attributes(path)
+        self.file = _openimageio().ImageInput.open(str(path))
+        if self.file is None:
+            raise ValueError(f"{path} cannot be read in parts: it is damaged")
+        spec = self.file.spec()
+        if self.attributes.parts > 1 or spec.tile_width:
+            raise ValueError(
+                f"{path} has several parts or tiles, so it can only be read whole: raise --memory, "
+                "or write it as one part in scan lines"
+            )
+        self.height, self.width, self.channels = spec.height, spec.width, spec.channelnames
+        nothing = dict.fromkeys(self.channels, np.zeros((1, 1)))
+        self.layout = recognise(nothing, spp)
+        if names:
+            self.layout = override(self.layout, nothing, names, path)
+        if len(nothing) > len(self.channels):
+            raise ValueError(f"{path}: --map to another file needs both whole: raise --memory")
+
+    def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
+        """Rows `start` to `stop` of the channels that make up these layers of a frame."""
+        wanted = {"beauty", "radiance", *layers}
+        names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
+        channels = self._read(start, stop, sorted(names & set(self.channels)))
+        (x, y), display = self.attributes.window
+        attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
+        return layouts.Source(self.path, channels, attributes, self.layout, part=True)
+
+    def rows(self, layers: Collection[str]) -> Rows:
+        """The rows of these layers on demand."""
+
+        def read(start: int, stop: int) -> Frame:
+            found = layouts.assemble(self.part(start, stop, layers))
+            return Frame(**{n: a if n in layers else None for n, a in found.items()})  # type: ignore[arg-type]
+
+        return Rows(self.height, self.width, read)
+
+    def _read(self, start: int, stop: int, names: list[str]) -> dict[str, np.ndarray]:
+        places = [self.channels.index(name) for name in names]
+        first, last = min(places), max(places) + 1
+        found = np.empty((len(names), stop - start, self.width), np.float32)
+        top = self.file.spec().y
+        for row in range(start, stop, BATCH):
+            end = min(row + BATCH, stop)
+            pixels = self.file.read_scanlines(0, 0, top + row, top + end, 0, first, last, "float")
+            if pixels is None:
+                raise ValueError(f"{self.path} is truncated or damaged: {self.file.geterror()}")
+            for plane, place in zip(found, places, strict=True):
+                plane[row - start : end - start] = pixels[..., place - first]
+        return dict(zip(names, found, strict=True))
+
+
+@contextmanager
+def writing(
+    path: Path,
+    size: tuple[int, int],
+    names: list[str],
+    comments: str = "",
+    window: exr.Window | None = None,
+    kind: str = "float",
+) -> Iterator[Callable[[Mapping[str, np.ndarray]], None]]:
+    """A function that appends rows of the channels `names` to a new file, there at the end.
+
+    size: height and width. kind: what the channels are stored as, float or half. Raises OSError.
+    """
+    window = window or exr.Window()
+    io = _openimageio()
+    spec = io.ImageSpec(size[1], size[0], len(names), kind)
+    spec.channelnames = names
+    spec.x, spec.y = window.origin
+    if window.display:
+        left, top, right, bottom = window.display
+        spec.full_x, spec.full_y = left, top
+        spec.full_width, spec.full_height = right - left + 1, bottom - top + 1
+    spec.attribute("compression", "zip")
+    spec.attribute("comments", comments)
+    row, stored = spec.y, np.float32 if kind == "float" else np.float16
+    with replacing(path) as beside:
+        file = io.ImageOutput.create(str(beside))
+        if not file.open(str(beside), spec):
+            raise OSError(f"{path} cannot be written: {file.geterror()}")
+
+        def append(channels: Mapping[str, np.ndarray]) -> None:
+            nonlocal row
+            pixels = np.stack([channels[name].astype(stored) for name in names], axis=-1)
+            if not file.write_scanlines(row, row + pixels.shape[0], 0, pixels):
+                raise OSError(f"{path} cannot be written: {file.geterror()}")
+            row += pixels.shape[0]
+
+        yield append
+        if not file.close():
+            raise OSError(f"{path} cannot be written: {file.geterror()}")
