@@ -1,6 +1,7 @@
 """The site builds without a warning, and its code blocks run as they stand."""
 
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from sybil import Document, Example
 from sybil.parsers import markdown
 
+from jflnr import exr
 from jflnr.cli import main
 from jflnr.frame import Frame, write_frame
 
@@ -36,10 +38,14 @@ def test_every_block_has_a_language(page: Path) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, frame: Frame, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the pages' blocks run: frames under the names that they use."""
-    for name in ("room.exr", "frames/a.exr", "frames/b.exr", "shot/room.exr"):
+    """Where the pages' blocks run: frames under the names that they use, at 1 and 4 samples."""
+    first = tmp_path / "room.exr"
+    write_frame(first, frame)
+    light = {f"indirect_4.{c}": frame.indirect[..., i] for i, c in enumerate("RGB")}
+    exr.write_channels(first, exr.read_channels(first) | light)
+    for name in ("a.exr", "b.exr", "frames/a.exr", "frames/b.exr", "more/c.exr", "shot/room.exr"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        write_frame(tmp_path / name, frame)
+        shutil.copy(first, tmp_path / name)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -49,7 +55,8 @@ def run_shell(example: Example) -> None:
     for line in example.parsed.splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] == ["jflnr"]:
-            assert main(words[1:]) == 0, line
+            redirected = words.index(">") if ">" in words else len(words)
+            assert main(words[1:redirected]) == 0, line
         elif words:
             subprocess.run(["bash", "-euc", line], check=True)
 
