@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 
-.PHONY: demo test lint slow clean
+.PHONY: demo test lint slow site clean
 
 demo: $(VENV)/demo
 	$(RUN) -m jflnr denoise jflnr/data/room.exr -o out/demo --png --reference --overwrite
@@ -20,6 +20,9 @@ lint: $(VENV)/test
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 
+site: $(VENV)/test
+	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build
+
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
@@ -28,7 +31,7 @@ $(VENV)/demo: pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(VENV)/test: pyproject.toml | $(VENV)/bin/python
-	$(RUN) -m pip install --quiet --editable '.[opencl,experiments,dev]'
+	$(RUN) -m pip install --quiet --editable '.[opencl,experiments,site,browser,dev]'
 	@touch $@ $(VENV)/demo
 
 clean:
