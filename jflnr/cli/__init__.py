@@ -5,14 +5,20 @@ import numerical code inside the functions that run it, so that `--help` and `in
 """
 
 import argparse
+import contextlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import denoise, devices, fit, info, metrics, report
-from jflnr.cli.common import INPUT_ERRORS, sentence
+from jflnr.cli import completion, denoise, devices, fit, info, metrics, report
+from jflnr.cli.common import INPUT_ERRORS, sentence, tinted
+
+EXAMPLES = """\
+  jflnr info render.exr                       what is in it, and what would be denoised
+  jflnr denoise render.exr -o out/ --png      the clean picture, and a preview to look at
+"""
 
 COMMANDS = {
     "denoise": denoise,
@@ -21,14 +27,16 @@ COMMANDS = {
     "report": report,
     "fit": fit,
     "devices": devices,
+    "completion": completion,
 }
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line (default: the process's own) and return its exit code."""
-    arguments = _parser().parse_args(argv)
+    arguments = parser().parse_args(argv)
     try:
-        code = arguments.run(arguments)
+        with _silence() if getattr(arguments, "quiet", False) else contextlib.nullcontext():
+            code = arguments.run(arguments)
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -38,8 +46,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except INPUT_ERRORS as error:
-        print(f"jflnr: {sentence(error)}", file=sys.stderr)
+        print(f"{tinted('jflnr:', 'red', sys.stderr)} {sentence(error)}", file=sys.stderr)
         return 2
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        yield
 
 
 class _Parser(argparse.ArgumentParser):
@@ -49,19 +63,28 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="jflnr", description="Denoise path-traced global illumination.")
-    parser.add_argument("--version", action="version", version=__version__)
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    whole = _Parser(
+        prog="jflnr",
+        description="Denoise path-traced global illumination.",
+        epilog=f"examples:\n{EXAMPLES}\n`jflnr COMMAND --help` says what a command takes.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    whole.add_argument("--version", action="version", version=__version__)
+    commands = whole.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, module in COMMANDS.items():
         summary = (module.__doc__ or "").partition("\n")[0].partition(": ")[2]
         command = commands.add_parser(
             name,
             help=summary,
             description=(module.__doc__ or "").partition(": ")[2],
+            epilog=f"examples:\n{examples}"
+            if (examples := getattr(module, "EXAMPLES", ""))
+            else None,
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )
         module.add_arguments(command)
         command.set_defaults(run=module.run)
-    return parser
+    return whole

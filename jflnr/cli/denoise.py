@@ -23,6 +23,7 @@ import numpy as np
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, add_map, guide_names, sentence, to_json
 from jflnr.cli.jobs import Job, make_folder, plan
+from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import remarks, summary
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ EXAMPLES = """\
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
 """
+
+DIRECT = "Direct light is left as it was rendered; --direct denoises it too."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     jobs = plan(arguments.inputs, arguments.output)
-    settings = _settings(arguments)
+    settings = settings_of(arguments)
     records = []
     compiled: set[tuple] = set()
     with tqdm(jobs, unit="frame", disable=arguments.quiet or None, leave=False) as bar:
@@ -83,63 +86,11 @@ def run(arguments: argparse.Namespace) -> int:
             records.append(record := _attempt(job, settings, arguments, compiled))
             for line in remarks(record, arguments.quiet):
                 bar.write(line, file=sys.stderr)
-            if not arguments.json and not arguments.quiet and "error" not in record:
+            if not arguments.json and "error" not in record:
                 bar.write(summary(record, arguments.verbose))
     if arguments.json:
         print(to_json(records))
     return 2 if any("error" in record for record in records) else 0
-
-
-def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
-    from jflnr import checks
-    from jflnr.denoising import BACKENDS, BLOCK, METHODS
-    from jflnr.flr import parameters
-
-    checks.choice("--method", arguments.method, METHODS)
-    checks.choice("--backend", arguments.backend, BACKENDS)
-    if arguments.profile and arguments.backend != "opencl":
-        raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
-    if arguments.method != "flr":
-        return _settings_of_another(arguments)
-    model, about = parameters.DEFAULT, dict[str, Any]()
-    if arguments.params:
-        model, about = parameters.load_parameters(arguments.params)
-    values = {}
-    for name in ("sigma", "eps", "eps_prime"):
-        given = getattr(arguments, name)
-        values[name] = float(getattr(model, name)) if given is None else given
-    return {
-        "method": arguments.method,
-        "backend": arguments.backend,
-        "parameters": parameters.Parameters.of(**values),
-        "guides": _guides(about) if arguments.guides is None else arguments.guides,
-        "block": about.get("block", BLOCK) if arguments.block is None else arguments.block,
-    }
-
-
-def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
-    """As `_settings`, for methods that have no sigma, eps and eps' to set."""
-    from jflnr.denoising import BLOCK
-
-    for name in ("params", "sigma", "eps", "eps_prime"):
-        if getattr(arguments, name) is not None:
-            option = name.replace("_", "-")
-            raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
-    return {
-        "method": arguments.method,
-        "backend": arguments.backend,
-        "guides": arguments.guides,
-        "block": BLOCK if arguments.block is None else arguments.block,
-    }
-
-
-def _guides(about: dict[str, Any]) -> list[str] | None:
-    """The guides that a parameter file names, if it does."""
-    guides = about.get("guides")
-    if guides is None or (isinstance(guides, list) and all(isinstance(g, str) for g in guides)):
-        return guides
-    raise ValueError(f"--params: its guides must be a list of names; got {guides!r}")
 
 
 def _attempt(
@@ -191,9 +142,11 @@ def _denoise(
     compiled.add(shapes)
     spp = arguments.spp if layouts.native.spp_present(source.channels) else None
     about = _about(frame, settings, spp)
-    indirect, *direct = np.split(light, light.shape[-1] // 3, axis=-1)
-    lights = {"indirect": indirect} | ({"direct": direct[0]} if direct else {})
+    indirect = light[..., :3]
+    lights = {"indirect": indirect} | ({"direct": light[..., 3:]} if arguments.direct else {})
     _write(job, source, frame, lights, about, arguments)
+    # Our own files hold converged direct light; other programs' is as noisy as the rest.
+    left = spp is None and frame.direct is not None and not arguments.direct
     record = {
         "width": indirect.shape[1],
         "height": indirect.shape[0],
@@ -202,7 +155,11 @@ def _denoise(
         **about,
         "seconds": times[-1] - times[-2],
         "compile_seconds": times[-2] - times[0],
-        "warnings": [*{str(warning.message): None for warning in caught}, *_not_finite(frame)],
+        "warnings": [
+            *{str(warning.message): None for warning in caught},
+            *_not_finite(frame),
+            *([DIRECT] if left else []),
+        ],
     }
     if arguments.profile:
         from jflnr.opencl.context import default_context

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from jflnr.frame import Frame
 
 
+EXAMPLES = """\
+  jflnr fit frames/ -o params.json
+  jflnr denoise shot/ -o clean/ --params params.json
+"""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("frames", metavar="FRAME", nargs="+", type=Path, help="EXR frames, or folders of them")
@@ -25,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--block", type=int, help="side of the squares of pixels that share one model")
     add("--steps", type=int, default=40, metavar="N", help="steps of L-BFGS at most (40)")
     add("--overwrite", action="store_true", help="replace OUT if it exists")
+    add("-q", "--quiet", action="store_true", help="print nothing but errors")
 
 
 def run(arguments: argparse.Namespace) -> int:

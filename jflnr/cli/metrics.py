@@ -18,6 +18,12 @@ import numpy as np
 from jflnr import layouts
 from jflnr.cli.common import metrics_table, to_json
 
+EXAMPLES = """\
+  jflnr metrics clean/room.exr room.exr       against the frame's own reference
+  jflnr metrics room.exr --spp 4              how noisy the frame is
+  jflnr metrics a.exr b.exr --json            two pictures
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("a", metavar="A", type=Path, help="the image to judge, EXR")

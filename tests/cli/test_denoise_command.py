@@ -106,6 +106,46 @@ def test_options_reach_the_denoiser(tmp_path: Path, frame_file: Path, stand_in: 
     assert (bare["block"], bare["guides"]) == (2, ())
 
 
+def test_direct_light_is_denoised_beside_the_indirect(
+    tmp_path: Path, frame: Frame, frame_file: Path, stand_in: list[dict]
+) -> None:
+    """Each keeps its layer, and both make up the picture."""
+    assert run(frame_file, "-o", tmp_path / "out.exr", "--direct", "--channels", "all") == 0
+    channels = exr.read_channels(tmp_path / "out.exr")
+    picture = frame.albedo * 0.5 * (frame.indirect + frame.direct) + frame.emission
+    for i, c in enumerate("RGB"):
+        np.testing.assert_array_equal(channels[f"direct.{c}"], 0.5 * frame.direct[..., i])
+        np.testing.assert_allclose(channels[c], picture[..., i], rtol=1e-6)
+    assert set(exr.read_channels(frame_file)) < set(channels)
+    write_frame(tmp_path / "a.exr", dataclasses.replace(frame, direct=None))
+    assert run(tmp_path / "a.exr", "-o", tmp_path / "b.exr", "--direct") == 2
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_only_the_picture(tmp_path: Path, frame_file: Path) -> None:
+    assert run(frame_file, "-o", tmp_path / "out.exr", "--channels", "picture") == 0
+    assert set(exr.read_channels(tmp_path / "out.exr")) == set("RGB")
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_quiet_prints_errors_only(
+    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(folder, "-o", tmp_path / "out", "--quiet") == 2
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert streams.err.count("\n") == 1 and "b.exr is truncated" in streams.err
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_verbose_says_how_the_file_was_read(
+    tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(frame_file, "-o", tmp_path / "out.exr", "--verbose") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:] == ["  layout: jflnr", "  guides: normal, depth, ao"]
+
+
 @pytest.mark.usefixtures("stand_in")
 def test_preview_shows_the_picture(tmp_path: Path, frame_file: Path) -> None:
     assert run(frame_file, "-o", tmp_path / "out.exr", "--png") == 0

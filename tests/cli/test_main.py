@@ -1,22 +1,29 @@
 """What holds for every command: exit codes, one-sentence errors, and quick answers."""
 
+import os
+import pty
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from jflnr.cli import main
-
-COMMANDS = ("denoise", "info", "metrics", "fit")
+from jflnr.cli import COMMANDS, main, parser
 
 
 @pytest.mark.parametrize("argv", [["--help"], *([name, "--help"] for name in COMMANDS)])
-def test_help(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_shows_examples(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    """Every example is a command line that the parser takes."""
     with pytest.raises(SystemExit) as stop:
         main(argv)
-    assert stop.value.code == 0
-    assert "usage: jflnr" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert stop.value.code == 0 and "usage: jflnr" in text
+    examples = re.findall(r"^ +jflnr (.+?)(?:  +.*)?$", text, re.MULTILINE)
+    assert examples or argv[0] == "devices"
+    for example in examples:
+        parser().parse_args(shlex.split(example.partition(">")[0]))
 
 
 @pytest.mark.parametrize(
@@ -64,3 +71,49 @@ def test_a_closed_pipe_is_no_error(frame_file: Path) -> None:
     code = f"{sys.executable} -m jflnr info {frame_file} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", code], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["den"], {"denoise"}),
+        (["denoise", "--ov"], {"--overwrite"}),
+        (["denoise", "--method", "flr-"], {"flr-adaptive"}),
+        (["info", "fra"], {"frame.exr"}),
+    ],
+)
+def test_bash_completes(
+    frame_file: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: set[str]
+) -> None:
+    assert main(["completion", "bash"]) == 0
+    line = shlex.join(["jflnr", *words])
+    ask = f"COMP_WORDS=({line}); COMP_CWORD={len(words)}; _shtab_jflnr; echo ${{COMPREPLY[@]}}"
+    command = ["bash", "-c", f"{capsys.readouterr().out}\n{ask}"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=frame_file.parent)
+    assert set(done.stdout.split()) == expected, done.stderr
+
+
+@pytest.mark.parametrize("shell", ["zsh", "tcsh"])
+def test_other_shells_have_a_script(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert "denoise" in script and "overwrite" in script
+
+
+def on_a_terminal(*arguments: str, **environment: str) -> bytes:
+    """What a command shows when its errors go to a terminal."""
+    terminal, inside = pty.openpty()
+    command = [sys.executable, "-m", "jflnr", *arguments]
+    plain = {n: v for n, v in os.environ.items() if n not in ("NO_COLOR", "TERM")}
+    subprocess.run(command, stderr=inside, env=plain | {"TERM": "xterm"} | environment)
+    os.close(inside)
+    shown = os.read(terminal, 1 << 16)
+    os.close(terminal)
+    return shown
+
+
+def test_colours_on_a_terminal_only(tmp_path: Path) -> None:
+    gone = str(tmp_path / "gone.exr")
+    assert on_a_terminal("info", gone).startswith(b"\033[31mjflnr:\033[0m ")
+    for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+        assert on_a_terminal("info", gone, **environment).startswith(b"jflnr: ")

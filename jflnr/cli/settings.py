@@ -1,0 +1,56 @@
+"""From the options of `jflnr denoise` to the keyword arguments of `jflnr.denoise`."""
+
+import argparse
+from typing import Any
+
+
+def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
+    from jflnr import checks
+    from jflnr.denoising import BACKENDS, BLOCK, METHODS
+    from jflnr.flr import parameters
+
+    checks.choice("--method", arguments.method, METHODS)
+    checks.choice("--backend", arguments.backend, BACKENDS)
+    if arguments.profile and arguments.backend != "opencl":
+        raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
+    if arguments.method != "flr":
+        return _settings_of_another(arguments)
+    model, about = parameters.DEFAULT, dict[str, Any]()
+    if arguments.params:
+        model, about = parameters.load_parameters(arguments.params)
+    values = {}
+    for name in ("sigma", "eps", "eps_prime"):
+        given = getattr(arguments, name)
+        values[name] = float(getattr(model, name)) if given is None else given
+    return {
+        "method": arguments.method,
+        "backend": arguments.backend,
+        "parameters": parameters.Parameters.of(**values),
+        "guides": _guides(about) if arguments.guides is None else arguments.guides,
+        "block": about.get("block", BLOCK) if arguments.block is None else arguments.block,
+    }
+
+
+def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
+    """As `_settings`, for methods that have no sigma, eps and eps' to set."""
+    from jflnr.denoising import BLOCK
+
+    for name in ("params", "sigma", "eps", "eps_prime"):
+        if getattr(arguments, name) is not None:
+            option = name.replace("_", "-")
+            raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
+    return {
+        "method": arguments.method,
+        "backend": arguments.backend,
+        "guides": arguments.guides,
+        "block": BLOCK if arguments.block is None else arguments.block,
+    }
+
+
+def _guides(about: dict[str, Any]) -> list[str] | None:
+    """The guides that a parameter file names, if it does."""
+    guides = about.get("guides")
+    if guides is None or (isinstance(guides, list) and all(isinstance(g, str) for g in guides)):
+        return guides
+    raise ValueError(f"--params: its guides must be a list of names; got {guides!r}")
