@@ -2,8 +2,8 @@
 
     python docs/screenshots.py
 
-The chart's needs out/report.html (`python -m experiments report`), the site's out/site (`make site`);
-without them these two are left as they are.
+The chart's needs out/report.html (`python -m experiments report`), the site's out/site (`make
+site`); without them these two are left as they are.
 """
 
 import shutil

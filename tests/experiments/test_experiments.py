@@ -92,7 +92,9 @@ def test_quick_versions_leave_evidence_and_charts(name, tmp_path, monkeypatch):
     evidence = json.loads((tmp_path / f"{name}.json").read_bytes())
     assert evidence["quick"] and evidence["environment"]["versions"]["jax"]
     assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+    monkeypatch.setattr("experiments.report.scenes", lambda out: [])  # tests/report has those
     assert main(["report", "--out", str(tmp_path), "--docs", str(tmp_path / "docs")]) == 0
+    assert f"{name}: rows" in (tmp_path / "report.html").read_text()
     assert (tmp_path / "docs" / f"{name}.md").read_text().startswith("| ")
 
 
