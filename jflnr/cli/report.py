@@ -4,14 +4,16 @@ IN are frames, files that `jflnr denoise` wrote from them, or plain R, G, B pict
 needs no network and no other file. It shows the real values at any exposure, splits, flips, zooms,
 and maps the errors where there is a reference: the frame's own, or for plain pictures --reference.
 
-    jflnr denoise room.exr -o out
-    jflnr report room.exr out/room.exr -o report.html
-
 A version is named by its file, or by its folder where the file is named like the frame.
 """
 
 import argparse
 from pathlib import Path
+
+EXAMPLES = """\
+  jflnr report room.exr out/room.exr -o report.html     a frame and what was denoised from it
+  jflnr report a.exr b.exr --reference c.exr -o r.html  plain pictures
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
