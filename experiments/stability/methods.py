@@ -13,6 +13,8 @@ import numpy as np
 
 from experiments.stability import solvers
 from experiments.stability.cases import Case, Type
+from jflnr.flr.adaptive import flr_adaptive
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
 
@@ -76,6 +78,20 @@ def by_jax(solver: str, case: Case, dtype: Type) -> np.ndarray:
         return np.asarray(_compiled(solver, guides)(y, x, jnp.asarray(case.usable)))
 
 
+@functools.cache
+def _adaptive() -> Callable[..., jax.Array]:
+    return jax.jit(lambda y, x, usable: flr_adaptive(y, x, ADAPTIVE_DEFAULT, weight=usable))
+
+
+def by_adaptive(case: Case, dtype: Type) -> np.ndarray:
+    """Adaptive FLR, of the noisy image and of the light apart: it is not linear in its input."""
+    with jax.enable_x64(dtype == np.float64):
+        y, x = (jnp.asarray(a.astype(dtype)) for a in (case.target, case.guides))
+        usable = jnp.asarray(case.usable)
+        found = [_adaptive()(y[..., c : c + 1], x, usable) for c in range(y.shape[2])]
+        return np.concatenate([np.asarray(image) for image in found], axis=-1)
+
+
 def by_opencl(case: Case, dtype: Type) -> np.ndarray:
     """The OpenCL kernels, which compute in float32 and read float32 or half."""
     from jflnr.opencl.regression import flr as on_device
@@ -96,6 +112,7 @@ METHODS: dict[str, Method] = {
     "ours, block inverse": functools.partial(by_jax, "block-inverse"),
     "ours, Cholesky": functools.partial(by_jax, "cholesky"),
     "ours, OpenCL": by_opencl,
+    "ours, adaptive": by_adaptive,
 }
 # The exact answer to the problem that a method solves, in float64.
 UNREGULARISED = functools.partial(by_numpy, solvers.svd)
@@ -103,4 +120,4 @@ TRUTHS: dict[str, Method] = {
     name: UNREGULARISED for name in ("inverse (Eq. 7)", "LU", "Householder QR", "SVD")
 } | {"Tikhonov (Eq. 11)": functools.partial(by_numpy, solvers.tikhonov_exact)}
 EXACT: Method = functools.partial(by_numpy, solvers.exact)
-OURS = ("ours, block inverse", "ours, Cholesky", "ours, OpenCL")
+OURS = ("ours, block inverse", "ours, Cholesky", "ours, OpenCL", "ours, adaptive")

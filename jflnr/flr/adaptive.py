@@ -21,7 +21,7 @@ from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
 from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, predict
 from jflnr.flr.merge import interpolate, signal_share
-from jflnr.flr.moments import Guides, centre, collect, index_xy
+from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude
 from jflnr.flr.pyramid import double, halve
 from jflnr.flr.weighted_moments import collect_weighted
 
@@ -69,6 +69,8 @@ def flr_adaptive(
     checks.positive_integer("levels", levels)
     numbers = parameters.numbers()
     shift = centre(guides)
+    unit = magnitude(target)
+    target = target / unit
     block = max(block // 2, 1)
     moments = collect_light(target, guides, shift, weight, block)
     mean = frame_mean(moments, shift.size)
@@ -77,7 +79,7 @@ def flr_adaptive(
     coefficients = fit_pyramid(grid, shift, target.shape[-1], levels, mean, numbers)
     coefficients = restore(coefficients, moments, shift.size, numbers.slack)
     image = apply(coefficients, guides, shift, block)
-    return rescale(image, light_of(target), weight) if keep_energy else image
+    return unit * (rescale(image, light_of(target), weight) if keep_energy else image)
 
 
 def light_of(target: jax.Array) -> jax.Array:

@@ -14,6 +14,8 @@ from jax import lax
 
 from jflnr.flr.moments import index_xx, index_xy
 
+# Roundings of a sum of squares that may add up.
+ROUNDING = 64
 # Blocks that are solved at a time.
 STRIP = 4096
 
@@ -52,7 +54,9 @@ def _solve(planes: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
     covariance = jnp.where(diagonal, jnp.maximum(covariance, 0), covariance)
     mu = mean_x + shift[:, None, None].astype(means.dtype)
     outer = eps * mu[:, None] * mu
-    regular = covariance + outer + jnp.where(diagonal, outer + eps_prime, 0)
+    # Of a narrow window far from the shift, no more of the variance is known than this.
+    rounding = ROUNDING * jnp.finfo(means.dtype).eps * (covariance + mean_x[:, None] * mean_x)
+    regular = covariance + outer + jnp.where(diagonal, outer + eps_prime + rounding, 0)
 
     scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)]))
     correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)

@@ -58,6 +58,20 @@ def centre(guides: Guides, weight: jax.Array | None = None) -> jax.Array:
     return lax.stop_gradient(jnp.stack(values) if values else jnp.zeros(0))
 
 
+def magnitude(image: jax.Array) -> jax.Array:
+    """A power of two near the largest value on a sparse grid of pixels, or 1.
+
+    Dividing by it rounds nothing, and squares of what is left do not overflow.
+    image: `(H, W, C)`. Returns a scalar.
+    """
+    sample = jnp.stack([_sparse(plane) for plane in planes(image)])
+    sample = jnp.abs(sample.astype(working_type(sample)))
+    largest = jnp.max(jnp.where(jnp.isfinite(sample), sample, 0))
+    # One power less: the next one may be beyond the type.
+    unit = jnp.ldexp(jnp.ones((), sample.dtype), jnp.frexp(largest)[1] - 1)
+    return lax.stop_gradient(jnp.where(largest > 0, unit, 1))
+
+
 def _sparse(plane: jax.Array) -> jax.Array:
     return plane[tuple(slice(None, None, max(size // 32, 1)) for size in plane.shape)]
 

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jflnr.flr.moments import Guides, planes
+from jflnr.flr.moments import Guides, from_shift, planes
 
 
 def collect_weighted(
@@ -56,7 +56,10 @@ def _strip(
 ) -> jax.Array:
     """Moments of some rows of blocks: `(rows, W, ...)` to `(K + 1, rows / block, w)`."""
     used = weight > 0
-    x = [jnp.where(used, plane - s, 0) for plane, s in zip(planes(guides), shift, strict=True)]
+    x = [
+        jnp.where(used, from_shift(plane, s), 0)
+        for plane, s in zip(planes(guides), shift, strict=True)
+    ]
     y = [jnp.where(used, plane, 0) for plane in planes(target)]
     weighted = [weight, *(weight * plane for plane in x)]
     weighted, x, y = lax.optimization_barrier((weighted, x, y))
