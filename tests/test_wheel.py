@@ -1,6 +1,7 @@
 """The built wheel, installed where nothing else is: it holds all it needs, and works."""
 
 import subprocess
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import jflnr
 from jflnr import exr
 
 REPOSITORY = Path(__file__).parents[1]
@@ -30,6 +32,13 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (wheel,) = folder.glob("jflnr-*.whl")
     run(*pip, "install", wheel, cwd=folder)
     return folder
+
+
+def test_versions_agree() -> None:
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    citation = (REPOSITORY / "CITATION.cff").read_text()
+    assert project["version"] == jflnr.__version__
+    assert f"\nversion: {jflnr.__version__}\n" in citation
 
 
 @pytest.mark.slow

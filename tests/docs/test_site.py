@@ -13,6 +13,7 @@ from sybil.parsers import markdown
 from jflnr import exr
 from jflnr.cli import main
 from jflnr.frame import Frame, write_frame
+from tests.layouts.blender_passes import passes
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -38,9 +39,10 @@ def test_every_block_has_a_language(page: Path) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, frame: Frame, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the pages' blocks run: frames under the names that they use, at 1 and 4 samples."""
+    """Where the pages' blocks run: our frames, at 1 and 4 samples, and one of Blender's."""
     first = tmp_path / "room.exr"
     write_frame(first, frame)
+    exr.write_channels(tmp_path / "render.exr", passes(frame))
     light = {f"indirect_4.{c}": frame.indirect[..., i] for i, c in enumerate("RGB")}
     exr.write_channels(first, exr.read_channels(first) | light)
     for name in ("a.exr", "b.exr", "frames/a.exr", "frames/b.exr", "more/c.exr", "shot/room.exr"):

@@ -1,6 +1,6 @@
 """Run by Blender's Python: render a small scene as multilayer EXR.
 
-    python blender_scene.py OUT WIDTH HEIGHT PASSES [SCRIPT]
+    python blender_scene.py OUT WIDTH HEIGHT SAMPLES PASSES [SCRIPT]
 
 PASSES is `all`, `denoising` (only what `Denoising Data` gives) or `denoised` (both, with Blender's
 own denoiser on). With SCRIPT, that example is run on the scene instead, and its picture saved.
@@ -37,7 +37,7 @@ def put(shape, made, **where):
     bpy.context.object.data.materials.append(made)
 
 
-def build(width, height):
+def build(width, height, samples):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     put("plane", material((0.8, 0.8, 0.8)), size=10)
@@ -49,8 +49,8 @@ def build(width, height):
     bpy.context.object.data.energy = 400
     bpy.ops.object.camera_add(location=(0, -7, 2.5), rotation=(1.35, 0, 0))
     scene.camera = bpy.context.object
-    scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 1
-    scene.cycles.use_denoising = False
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
     return scene
@@ -69,8 +69,8 @@ def write(scene, path, passes):
     bpy.ops.render.render(write_still=True)
 
 
-def main(path, width, height, passes, script=""):
-    scene = build(int(width), int(height))
+def main(path, width, height, samples, passes, script=""):
+    scene = build(int(width), int(height), int(samples))
     if not script:
         return write(scene, path, passes)
     before = scene.render.filepath, scene.render.image_settings.file_format

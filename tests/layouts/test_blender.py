@@ -14,35 +14,7 @@ import pytest
 from jflnr import denoising, exr, layouts
 from jflnr.cli import main
 from jflnr.frame import Frame, composite, read_frame
-
-OLD = {"Diffuse Indirect": "DiffInd", "Diffuse Direct": "DiffDir", "Diffuse Color": "DiffCol"}
-OLD |= {"Ambient Occlusion": "AO"}
-
-
-def passes(frame: Frame, view: str = "ViewLayer", old: bool = False) -> dict[str, np.ndarray]:
-    """What Blender would write of `frame`, with a lamp, glossy light and a sky in the picture."""
-    depth, glossy = frame.depth.copy(), 0.25 * frame.direct[..., ::-1]
-    albedo = frame.albedo.copy()
-    albedo[:3], depth[:3], depth[3:5] = 0, 1e10, 3
-    albedo[3:5] = 0  # a mirror
-    picture = albedo * (frame.direct + frame.indirect) + frame.emission + glossy
-    alpha = np.where(depth < 1e9, 1, 0.5)
-    layers = {
-        "Combined": ("RGBA", np.concatenate([picture, alpha], -1)),
-        "Diffuse Indirect": ("RGB", np.where(albedo > 0, frame.indirect, 0)),
-        "Diffuse Direct": ("RGB", np.where(albedo > 0, frame.direct, 0)),
-        "Diffuse Color": ("RGB", albedo),
-        "Glossy Direct": ("RGB", glossy),
-        "Normal": ("XYZ", frame.normal),
-        "Depth": ("Z", depth),
-        "Position": ("XYZ", frame.position),
-        "Ambient Occlusion": ("RGB", np.repeat(frame.ao.round(), 3, -1)),
-    }
-    return {
-        f"{view}.{OLD.get(name, name) if old else name}.{c}": image[..., i].astype(np.float32)
-        for name, (components, image) in layers.items()
-        for i, c in enumerate(components)
-    }
+from tests.layouts.blender_passes import passes
 
 
 def beauty(path: Path, layer: str = "ViewLayer.Combined") -> np.ndarray:
@@ -226,7 +198,7 @@ def render(python: Path, *arguments: object) -> None:
 @pytest.mark.parametrize("written", ["all", "denoising", "denoised"])
 def test_a_real_render(blender: Path, tmp_path: Path, written: str) -> None:
     path, out = tmp_path / "render.exr", tmp_path / "out.exr"
-    render(blender, path, 96, 64, written)
+    render(blender, path, 96, 64, 1, written)
     read = read_frame(path)
     noisy = beauty(path, "ViewLayer.Noisy Image" if written == "denoised" else "ViewLayer.Combined")
     np.testing.assert_allclose(composite(read, read.indirect), noisy, rtol=1e-4, atol=1e-4)
@@ -241,7 +213,7 @@ def test_a_real_render(blender: Path, tmp_path: Path, written: str) -> None:
 @pytest.mark.slow
 def test_what_is_known_of_blenders_passes(blender: Path, tmp_path: Path) -> None:
     """Depth runs along the view axis, normals face the camera, the passes sum to the picture."""
-    render(blender, tmp_path / "a.exr", 96, 64, "all")
+    render(blender, tmp_path / "a.exr", 96, 64, 1, "all")
     read = read_frame(tmp_path / "a.exr")
     eye, axis = np.array([0, -7, 2.5]), np.array([0, np.sin(1.35), -np.cos(1.35)])
     hit = read.depth[..., 0] > 0
@@ -254,8 +226,8 @@ def test_what_is_known_of_blenders_passes(blender: Path, tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_the_example_script(blender: Path, tmp_path: Path) -> None:
-    render(blender, tmp_path / "noisy.exr", 96, 64, "all")
-    render(blender, tmp_path / "clean.exr", 96, 64, "all", EXAMPLE)
+    render(blender, tmp_path / "noisy.exr", 96, 64, 1, "all")
+    render(blender, tmp_path / "clean.exr", 96, 64, 1, "all", EXAMPLE)
     clean = np.stack([exr.read_channels(tmp_path / "clean.exr")[c] for c in "RGB"], -1)
     noisy = beauty(tmp_path / "noisy.exr")
     assert clean.shape == noisy.shape
