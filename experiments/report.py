@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+import jflnr
 from experiments import data
 from experiments.methods import Method, ours, peers
 from jflnr import exr
@@ -18,7 +19,7 @@ from jflnr.report.page import write_report
 from jflnr.report.scenes import Scene, of_frame
 
 FILE = "report.html"
-METHODS = ("flr", "flr-adaptive", "OIDN, tuned")
+SHOWN = (*jflnr.METHODS, "OIDN, tuned")
 
 
 def write(out: Path, names: Sequence[str]) -> None:
@@ -32,8 +33,8 @@ def write(out: Path, names: Sequence[str]) -> None:
 
 
 def scenes(out: Path) -> list[Scene]:
-    """One view of each test scene by `METHODS`; `OUT/pictures` keeps what was denoised."""
-    methods = [method for method in [*ours(), *peers()] if method.name in METHODS]
+    """One view of each test scene by each of `SHOWN`; `OUT/pictures` keeps what was denoised."""
+    methods = [method for method in [*ours(), *peers()] if method.name in SHOWN]
     made = []
     for path in data.one_view_each("test"):
         frame = data.read(path)

@@ -88,6 +88,7 @@ def _image(scene: Scene, name: str, unit: float) -> dict[str, Any]:
     return {
         "name": name,
         "light": pack(scene.images[name] / unit),
+        "direct": pack(scene.direct[name] / unit) if name in scene.direct else None,
         "flip": None if errors is None else _deflated(np.uint8(np.round(255 * errors)).tobytes()),
         "metrics": scene.measure(name) if measured else None,
     }
@@ -146,4 +147,4 @@ def pack(image: np.ndarray) -> str:
 
 
 def _deflated(data: bytes) -> str:
-    return base64.b64encode(zlib.compress(data, 9)).decode()
+    return base64.b64encode(zlib.compress(data)).decode()

@@ -19,11 +19,13 @@ class Scene:
 
     With a `frame` they are demodulated indirect light, without one radiance. The version called
     `reference`, if there is one, is what the others are measured against, and comes last.
+    `direct` is the direct light of versions that have one of their own instead of the frame's.
     """
 
     name: str
     images: dict[str, np.ndarray]
     frame: Frame | None = None
+    direct: dict[str, np.ndarray] = field(default_factory=dict)
     size: tuple[int, int] = field(init=False)  # (H, W)
 
     def __post_init__(self) -> None:
@@ -43,12 +45,17 @@ class Scene:
         return metrics.measure(self.frame, self.images[name])
 
 
-def of_frame(name: str, frame: Frame, lights: dict[str, np.ndarray]) -> Scene:
+def of_frame(
+    name: str,
+    frame: Frame,
+    lights: dict[str, np.ndarray],
+    direct: dict[str, np.ndarray] | None = None,
+) -> Scene:
     """The frame's noisy light, the denoised `lights`, and its reference if it has one."""
     images = {NOISY: np.asarray(frame.indirect), **lights}
     if frame.reference is not None:
         images[REFERENCE] = np.asarray(frame.reference)
-    return Scene(name, images, frame)
+    return Scene(name, images, frame, direct or {})
 
 
 def collect(paths: Sequence[Path], spp: int, reference: Path | None) -> list[Scene]:
@@ -70,8 +77,13 @@ def collect(paths: Sequence[Path], spp: int, reference: Path | None) -> list[Sce
     scenes = []
     for source in frames:
         names = _names([path for path in pictures if owners[path] == source], source.stem)
-        lights = {name: _light(channels[path], path) for path, name in names.items()}
-        scenes.append(of_frame(source.stem, read_frame(source, spp), lights))
+        lights = {name: _light(channels[path], path, "indirect") for path, name in names.items()}
+        direct = {
+            name: _light(channels[path], path, "direct")
+            for path, name in names.items()
+            if "direct.R" in channels[path]
+        }
+        scenes.append(of_frame(source.stem, read_frame(source, spp), lights, direct))
     return scenes
 
 
@@ -119,10 +131,10 @@ def _colours(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
     return layouts.layer(channels, "picture", tuple("RGB"), str(path))
 
 
-def _light(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
+def _light(channels: dict[str, np.ndarray], path: Path, layer: str) -> np.ndarray:
     if "indirect.R" not in channels:
         raise ValueError(
             f"{path} holds no layer indirect, so that it cannot be compared with a frame; "
             "leave the frame out to compare plain pictures"
         )
-    return layouts.layer(channels, "indirect", tuple(f"indirect.{c}" for c in "RGB"), str(path))
+    return layouts.layer(channels, layer, tuple(f"{layer}.{c}" for c in "RGB"), str(path))

@@ -1,5 +1,6 @@
 """The page in a browser: what is on the canvas must be what was measured."""
 
+import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from jflnr.frame import composite
 from jflnr.metrics import exposure
 from jflnr.report.scenes import Scene
 
@@ -70,6 +72,21 @@ def test_pixels_are_those_of_the_metrics(page: Any, scene: Scene) -> None:
     np.testing.assert_allclose(shown(page, 3, 4), displayed(scene, "half", 1)[4, 3], atol=1)
     press(page, "r", "3")
     np.testing.assert_allclose(shown(page, 7, 5)[1:], (0, 255))
+
+
+def test_whole_picture_is_the_composite(page: Any, scene: Scene) -> None:
+    """albedo * (direct + indirect) + emission, with a version's own direct light if it has one."""
+    frame, half = scene.frame, scene.images["half"]
+    assert frame is not None and frame.direct is not None
+    reflected = scene.radiance(scene.images["reference"] + frame.direct)
+    wanted = [
+        composite(frame, scene.images["reference"]),
+        composite(dataclasses.replace(frame, direct=2 * half), half),
+    ]
+    press(page, "v", "4", "Shift+Digit2")
+    for picture, (x, y) in zip(wanted, ((3, 4), (36, 20)), strict=True):
+        shade = 255 * np.clip(np.asarray(picture) * exposure(reflected), 0, 1) ** (1 / 2.2)
+        np.testing.assert_allclose(shown(page, x, y), shade[y, x], atol=1)
 
 
 def test_slider_and_keys_choose_what_is_shown(page: Any, scene: Scene) -> None:

@@ -3,7 +3,9 @@
 const HALVES = (() => {
   const table = new Float32Array(65536);
   for (let bits = 0; bits < 65536; bits++) {
-    const sign = bits & 0x8000 ? -1 : 1, exponent = (bits >> 10) & 31, fraction = bits & 1023;
+    const sign = bits & 0x8000 ? -1 : 1,
+      exponent = (bits >> 10) & 31,
+      fraction = bits & 1023;
     if (exponent === 31) table[bits] = fraction ? NaN : sign * Infinity;
     else if (exponent === 0) table[bits] = sign * fraction * 2 ** -24;
     else table[bits] = sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
@@ -35,6 +37,7 @@ async function loadScene(stored) {
     scene.images.push({
       ...image,
       light: await unpack(image.light, stored.unit),
+      direct: image.direct && (await unpack(image.direct, stored.unit)),
       flip: image.flip && (await inflate(image.flip)),
       canvases: {},
       radiance: {},
@@ -45,12 +48,14 @@ async function loadScene(stored) {
 
 /** Linear values of one view of an image: `reflected`, `picture` or `light`. */
 function radianceOf(scene, image, view) {
-  const { albedo, direct, emission } = scene.layers;
+  const { albedo, emission } = scene.layers,
+    direct = image.direct ?? scene.layers.direct;
   if (view === "light" || !albedo) return image.light;
   return (image.radiance[view] ??= image.light.map((value, i) =>
     view === "reflected"
       ? albedo[i] * value
-      : albedo[i] * (direct ? direct[i] + value : value) + (emission ? emission[i] : 0)));
+      : albedo[i] * (direct ? direct[i] + value : value) + (emission ? emission[i] : 0),
+  ));
 }
 
 /** (x - y)^2 / (y^2 + epsilon mean(y)^2), mean over channels: its mean is the table's rMSE. */
@@ -62,7 +67,9 @@ function errorOf(scene, image) {
     const floor = CONTENT.epsilon * mean * mean;
     const ratio = (i) => (x[i] === y[i] ? 0 : (x[i] - y[i]) ** 2 / (y[i] ** 2 + floor));
     const count = scene.width * scene.height;
-    return Float32Array.from({ length: count },
-      (_, i) => (ratio(i) + ratio(i + count) + ratio(i + 2 * count)) / 3);
+    return Float32Array.from(
+      { length: count },
+      (_, i) => (ratio(i) + ratio(i + count) + ratio(i + 2 * count)) / 3,
+    );
   })());
 }

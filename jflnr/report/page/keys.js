@@ -20,22 +20,44 @@ function zoomMiddle(factor) {
 
 const SHORTCUTS = [
   { shown: "1 … 9", text: "image on the left; with Shift on the right" },
-  { shown: "← →", keys: { ArrowLeft: () => step("left", -1), ArrowRight: () => step("left", 1) },
-    text: "previous, next image; with Shift on the right" },
-  { shown: "↑ ↓", keys: { ArrowUp: () => stepScene(-1), ArrowDown: () => stepScene(1) },
-    text: "previous, next scene" },
-  { shown: "x", keys: { x: () => ([state.left, state.right] = [state.right, state.left], refresh()) },
-    text: "swap left and right" },
+  {
+    shown: "← →",
+    keys: { ArrowLeft: () => step("left", -1), ArrowRight: () => step("left", 1) },
+    text: "previous, next image; with Shift on the right",
+  },
+  {
+    shown: "↑ ↓",
+    keys: { ArrowUp: () => stepScene(-1), ArrowDown: () => stepScene(1) },
+    text: "previous, next scene",
+  },
+  {
+    shown: "x",
+    keys: { x: () => (([state.left, state.right] = [state.right, state.left]), refresh()) },
+    text: "swap left and right",
+  },
   { shown: "l", keys: { l: () => next("layout") }, text: "layout: one, split, all" },
-  { shown: "[ ]", keys: { "[": () => setSplit(state.split - 0.05), "]": () => setSplit(state.split + 0.05) },
-    text: "move the split" },
-  { shown: "e E", keys: { e: () => setStops(state.stops - 0.5), E: () => setStops(state.stops + 0.5) },
-    text: "half a stop darker, brighter" },
+  {
+    shown: "[ ]",
+    keys: { "[": () => setSplit(state.split - 0.05), "]": () => setSplit(state.split + 0.05) },
+    text: "move the split",
+  },
+  {
+    shown: "e E",
+    keys: { e: () => setStops(state.stops - 0.5), E: () => setStops(state.stops + 0.5) },
+    text: "half a stop darker, brighter",
+  },
   { shown: "v", keys: { v: () => next("view") }, text: "which light: reflected, picture, bare" },
   { shown: "m", keys: { m: () => next("map") }, text: "image, error, FLIP" },
   { shown: "t", keys: { t: () => next("tone") }, text: "tone curve" },
-  { shown: "+ −", keys: { "+": () => zoomMiddle(1.5), "=": () => zoomMiddle(1.5), "-": () => zoomMiddle(1 / 1.5) },
-    text: "zoom" },
+  {
+    shown: "+ −",
+    keys: {
+      "+": () => zoomMiddle(1.5),
+      "=": () => zoomMiddle(1.5),
+      "-": () => zoomMiddle(1 / 1.5),
+    },
+    text: "zoom",
+  },
   { shown: "f", keys: { f: () => fit() }, text: "fit the image into the window" },
   { shown: "c", keys: { c: () => addCrop() }, text: "add a crop under the pointer" },
   { shown: "r", keys: { r: () => reset() }, text: "reset" },
@@ -61,9 +83,20 @@ function onKey(event) {
 }
 
 function buildHelp() {
-  $("shortcuts").replaceChildren(...SHORTCUTS.map(({ shown, text }) => element("tr", {},
-    element("th", { scope: "row" }, ...shown.split(" ").map((key) => key === "…" ? "…" : element("kbd", {}, key))),
-    element("td", {}, text))));
+  $("shortcuts").replaceChildren(
+    ...SHORTCUTS.map(({ shown, text }) =>
+      element(
+        "tr",
+        {},
+        element(
+          "th",
+          { scope: "row" },
+          ...shown.split(" ").map((key) => (key === "…" ? "…" : element("kbd", {}, key))),
+        ),
+        element("td", {}, text),
+      ),
+    ),
+  );
   $("help-button").addEventListener("click", () => $("help").showModal());
   document.addEventListener("keydown", onKey);
 }

@@ -41,7 +41,9 @@ async function start() {
   buildTables();
   buildChart();
   if (!CONTENT.scenes.length) return;
-  $("scene").append(...CONTENT.scenes.map((scene, i) => element("option", { value: i }, scene.name)));
+  $("scene").append(
+    ...CONTENT.scenes.map((scene, i) => element("option", { value: i }, scene.name)),
+  );
   $("scene-label").hidden = CONTENT.scenes.length < 2;
   $("scene").addEventListener("change", () => showScene(Number($("scene").value)));
   listenToControls();

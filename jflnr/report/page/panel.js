@@ -44,20 +44,27 @@ function reset() {
 function buildPanel() {
   const { scene } = state;
   const views = Object.keys(VIEWS).filter((view) => view in scene.exposures);
-  $("view").replaceChildren(...views.map((view) => element("option", { value: view }, VIEWS[view])));
+  $("view").replaceChildren(
+    ...views.map((view) => element("option", { value: view }, VIEWS[view])),
+  );
   $("view").parentElement.hidden = views.length < 2;
   if (!views.includes(state.view)) state.view = views[0];
   $("map").parentElement.hidden = !scene.reference;
   $("map").options[2].disabled = !scene.images.some((image) => image.flip);
   if (!scene.reference) state.map = "image";
-  $("images").replaceChildren(...scene.images.map((image, i) => {
-    const pick = { type: "button", className: "left", onclick: () => choose("left", image) };
-    const other = { type: "button", className: "right", onclick: () => choose("right", image) };
-    return element("li", {},
-      element("button", pick, element("kbd", {}, String(i + 1)), ` ${image.name}`),
-      element("button", { ...other, title: `${image.name} on the right` }, "right"),
-      element("span", { className: "value" }));
-  }));
+  $("images").replaceChildren(
+    ...scene.images.map((image, i) => {
+      const pick = { type: "button", className: "left", onclick: () => choose("left", image) };
+      const other = { type: "button", className: "right", onclick: () => choose("right", image) };
+      return element(
+        "li",
+        {},
+        element("button", pick, element("kbd", {}, String(i + 1)), ` ${image.name}`),
+        element("button", { ...other, title: `${image.name} on the right` }, "right"),
+        element("span", { className: "value" }),
+      );
+    }),
+  );
 }
 
 /** Everything that shows a setting, brought up to date. */
@@ -69,8 +76,12 @@ function showPanel() {
   $("divider").hidden = state.layout !== "split";
   $("divider").style.left = `${100 * state.split}%`;
   $("divider").setAttribute("aria-valuenow", percent);
-  $("canvas").setAttribute("aria-label", state.layout === "split"
-    ? `${state.left.name} left, ${state.right.name} right` : state.left.name);
+  $("canvas").setAttribute(
+    "aria-label",
+    state.layout === "split"
+      ? `${state.left.name} left, ${state.right.name} right`
+      : state.left.name,
+  );
   showImages();
   showBar();
 }
@@ -79,7 +90,8 @@ function showImages() {
   const { scene, pointer } = state;
   $("place").textContent = pointer ? `pixel ${pointer.join(", ")}` : "point at a pixel to read it";
   [...$("images").children].forEach((row, i) => {
-    const [left, right, value] = row.children, image = scene.images[i];
+    const [left, right, value] = row.children,
+      image = scene.images[i];
     left.setAttribute("aria-pressed", image === state.left);
     right.setAttribute("aria-pressed", image === state.right);
     right.hidden = state.layout !== "split";
@@ -88,7 +100,8 @@ function showImages() {
 }
 
 function pixelText(scene, image, [x, y]) {
-  const at = y * scene.width + x, count = scene.width * scene.height;
+  const at = y * scene.width + x,
+    count = scene.width * scene.height;
   const values = radianceOf(scene, image, state.view);
   const text = [0, 1, 2].map((c) => number(values[at + c * count])).join("  ");
   if (!scene.reference || image === scene.reference) return text;
@@ -101,7 +114,7 @@ function number(value) {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "NaN" : value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
   if (Number.isInteger(value) && size < 1e9) return String(value);
-  return (size < 1e-3 || size >= 1e5) ? value.toExponential(2) : value.toPrecision(4);
+  return size < 1e-3 || size >= 1e5 ? value.toExponential(2) : value.toPrecision(4);
 }
 
 function showBar() {
@@ -121,16 +134,33 @@ function showBar() {
 function buildCrops() {
   const { scene } = state;
   $("crops").hidden = !scene.crops.length;
-  $("crop-rows").replaceChildren(...scene.crops.map((crop) => {
-    const tiles = scene.images.map((image) => element("button",
-      { type: "button", className: "tile", onclick: () => lookAt(crop, image) },
-      element("canvas", { width: crop.size, height: crop.size, ariaHidden: "true" }),
-      element("span", { className: "name" }, image.name)));
-    const remove = () => { scene.crops = scene.crops.filter((c) => c !== crop); buildCrops(); };
-    const label = `Remove the crop at ${crop.x}, ${crop.y}`;
-    return element("div", { className: "crop" }, ...tiles,
-      element("button", { type: "button", className: "remove", ariaLabel: label, onclick: remove }, "×"));
-  }));
+  $("crop-rows").replaceChildren(
+    ...scene.crops.map((crop) => {
+      const tiles = scene.images.map((image) =>
+        element(
+          "button",
+          { type: "button", className: "tile", onclick: () => lookAt(crop, image) },
+          element("canvas", { width: crop.size, height: crop.size, ariaHidden: "true" }),
+          element("span", { className: "name" }, image.name),
+        ),
+      );
+      const remove = () => {
+        scene.crops = scene.crops.filter((c) => c !== crop);
+        buildCrops();
+      };
+      const label = `Remove the crop at ${crop.x}, ${crop.y}`;
+      return element(
+        "div",
+        { className: "crop" },
+        ...tiles,
+        element(
+          "button",
+          { type: "button", className: "remove", ariaLabel: label, onclick: remove },
+          "×",
+        ),
+      );
+    }),
+  );
   showCrops();
 }
 
@@ -157,7 +187,8 @@ function lookAt(crop, image) {
 
 /** A crop around the pointer, or around the middle of the stage. */
 function addCrop() {
-  const { scene } = state, size = Math.min(64, scene.width, scene.height);
+  const { scene } = state,
+    size = Math.min(64, scene.width, scene.height);
   const [x, y] = state.pointer ?? [state.x, state.y];
   const corner = (at, length) => clamp(Math.floor(at - size / 2), 0, length - size);
   scene.crops.push({ x: corner(x, scene.width), y: corner(y, scene.height), size });

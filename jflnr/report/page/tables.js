@@ -2,16 +2,33 @@
 
 /** A table of `rows`, sorted by a click on a heading; `columns` maps keys to headings. */
 function sortable(columns, rows, name = (row, text) => text) {
-  const keys = Object.keys(columns), body = element("tbody"), head = element("tr");
+  const keys = Object.keys(columns),
+    body = element("tbody"),
+    head = element("tr");
   const best = Object.fromEntries(keys.slice(1).map((key) => [key, bestOf(rows, key)]));
-  const fill = (sorted) => body.replaceChildren(...sorted.map((row) => element("tr", {},
-    ...keys.map((key, i) => {
-      const text = number(row[key]);
-      return element("td", { className: i && row[key] === best[key] ? "best" : "" },
-        i ? text : name(row, text));
-    }))));
+  const fill = (sorted) =>
+    body.replaceChildren(
+      ...sorted.map((row) =>
+        element(
+          "tr",
+          {},
+          ...keys.map((key, i) => {
+            const text = number(row[key]);
+            return element(
+              "td",
+              { className: i && row[key] === best[key] ? "best" : "" },
+              i ? text : name(row, text),
+            );
+          }),
+        ),
+      ),
+    );
   for (const key of keys) {
-    const heading = element("th", { scope: "col" }, element("button", { type: "button" }, columns[key]));
+    const heading = element(
+      "th",
+      { scope: "col" },
+      element("button", { type: "button" }, columns[key]),
+    );
     heading.firstChild.onclick = () => {
       const up = heading.getAttribute("aria-sort") === "descending";
       for (const other of head.children) other.removeAttribute("aria-sort");
@@ -38,7 +55,9 @@ function sorted(rows, key, up) {
 
 function bestOf(rows, key) {
   if (!(key in CONTENT.labels)) return undefined;
-  const values = rows.map((row) => row[key]).filter((v) => typeof v === "number" && !Number.isNaN(v));
+  const values = rows
+    .map((row) => row[key])
+    .filter((v) => typeof v === "number" && !Number.isNaN(v));
   if (values.length < 2) return undefined;
   return CONTENT.lower.includes(key) ? Math.min(...values) : Math.max(...values);
 }
@@ -63,9 +82,17 @@ function buildMetrics() {
 
 /** Tables that came with the page; short ones are open. */
 function buildTables() {
-  $("tables").append(...CONTENT.tables.map(({ title, note, columns, rows }) =>
-    element("details", { open: rows.length <= 25 }, element("summary", {}, title),
-      element("p", { className: "hint" }, note), sortable(columns, rows))));
+  $("tables").append(
+    ...CONTENT.tables.map(({ title, note, columns, rows }) =>
+      element(
+        "details",
+        { open: rows.length <= 25 },
+        element("summary", {}, title),
+        element("p", { className: "hint" }, note),
+        sortable(columns, rows),
+      ),
+    ),
+  );
 }
 
 // Okabe and Ito's colours on a dark ground, told apart also by those who do not see red or green.
@@ -77,21 +104,40 @@ function buildChart() {
   const { title, rows, x } = CONTENT.chart;
   $("chart").hidden = false;
   $("chart-title").textContent = title;
-  const keys = Object.keys(CONTENT.labels)
-    .filter((key) => key !== x && rows.some((row) => typeof row[key] === "number"));
+  const keys = Object.keys(CONTENT.labels).filter(
+    (key) => key !== x && rows.some((row) => typeof row[key] === "number"),
+  );
   $("chart-metric").append(...keys.map((key) => element("option", { value: key }, arrowed(key))));
   Chart.defaults.color = "#d8d8d8";
   Chart.defaults.borderColor = "#3a3d42";
-  const chart = new Chart($("chart-canvas"), { type: "scatter", data: { datasets: [] }, options: {
-    maintainAspectRatio: false, animation: false,
-    scales: { x: { type: "logarithmic", title: { display: true, text: CONTENT.labels[x] } },
-      y: { title: { display: true, text: "" } } },
-    plugins: { legend: { labels: { usePointStyle: true } }, tooltip: { callbacks: { label: ({ raw }) => raw.name &&
-      `${raw.name}: ${number(raw.y)} in ${number(raw.x)} ${CONTENT.labels[x]}` } } },
-  } });
+  const chart = new Chart($("chart-canvas"), {
+    type: "scatter",
+    data: { datasets: [] },
+    options: {
+      maintainAspectRatio: false,
+      animation: false,
+      scales: {
+        x: { type: "logarithmic", title: { display: true, text: CONTENT.labels[x] } },
+        y: { title: { display: true, text: "" } },
+      },
+      plugins: {
+        legend: { labels: { usePointStyle: true } },
+        tooltip: {
+          callbacks: {
+            label: ({ raw }) =>
+              raw.name && `${raw.name}: ${number(raw.y)} in ${number(raw.x)} ${CONTENT.labels[x]}`,
+          },
+        },
+      },
+    },
+  });
   const show = () => {
     const key = $("chart-metric").value;
-    chart.data.datasets = datasets(rows.filter((row) => typeof row[key] === "number"), x, key);
+    chart.data.datasets = datasets(
+      rows.filter((row) => typeof row[key] === "number"),
+      x,
+      key,
+    );
     chart.options.scales.y.title.text = arrowed(key);
     chart.update();
   };
@@ -103,17 +149,34 @@ function datasets(rows, x, key) {
   const points = (some) => some.map((row) => ({ x: row[x], y: row[key], name: row.method }));
   const families = [...new Set(rows.map((row) => row.family))];
   const sets = families.map((family, i) => ({
-    label: family, data: points(rows.filter((row) => row.family === family)),
-    backgroundColor: COLOURS[i % 7], borderColor: COLOURS[i % 7], pointStyle: SHAPES[i % 7],
-    radius: 7, hoverRadius: 10, borderWidth: 2,
+    label: family,
+    data: points(rows.filter((row) => row.family === family)),
+    backgroundColor: COLOURS[i % 7],
+    borderColor: COLOURS[i % 7],
+    pointStyle: SHAPES[i % 7],
+    radius: 7,
+    hoverRadius: 10,
+    borderWidth: 2,
   }));
-  return [...sets, { label: "front: none is better and faster", data: points(front(rows, x, key)),
-    showLine: true, radius: 0, hitRadius: 0, borderColor: "#fff8", borderWidth: 1 }];
+  return [
+    ...sets,
+    {
+      label: "front: none is better and faster",
+      data: points(front(rows, x, key)),
+      showLine: true,
+      radius: 0,
+      hitRadius: 0,
+      borderColor: "#fff8",
+      borderWidth: 1,
+    },
+  ];
 }
 
 /** The rows that no faster one equals. */
 function front(rows, x, key) {
   const sign = CONTENT.lower.includes(key) ? -1 : 1;
   let best = -Infinity;
-  return sorted(rows, x, true).filter((row) => sign * row[key] > best && ((best = sign * row[key]), true));
+  return sorted(rows, x, true).filter(
+    (row) => sign * row[key] > best && ((best = sign * row[key]), true),
+  );
 }

@@ -9,13 +9,17 @@ const TONES = {
 };
 
 // Seventeen points of matplotlib's magma (CC0), as FLIP's own tools show it.
-const MAGMA = ("000004 0a0822 1d1147 36106b 51127c 6a1c81 832681 9c2e7f b73779 d0416f e75263 " +
-  "f56b5c fc8961 fea772 fec488 fde2a3 fcfdbf").split(" ")
+const MAGMA = (
+  "000004 0a0822 1d1147 36106b 51127c 6a1c81 832681 9c2e7f b73779 d0416f e75263 " +
+  "f56b5c fc8961 fea772 fec488 fde2a3 fcfdbf"
+)
+  .split(" ")
   .map((hex) => [0, 2, 4].map((at) => parseInt(hex.slice(at, at + 2), 16)));
 
 /** [R, G, B] for a share of 0..1. */
 function magma(share) {
-  const place = 16 * Math.min(Math.max(share, 0), 1), low = Math.min(Math.floor(place), 15);
+  const place = 16 * Math.min(Math.max(share, 0), 1),
+    low = Math.min(Math.floor(place), 15);
   return MAGMA[low].map((v, c) => Math.round(v + (place - low) * (MAGMA[low + 1][c] - v)));
 }
 
@@ -39,7 +43,8 @@ const MAPS = {
  * step. Not-a-numbers are shown black.
  */
 function toneTable(scale, tone) {
-  const bits = new Uint32Array(1), value = new Float32Array(bits.buffer);
+  const bits = new Uint32Array(1),
+    value = new Float32Array(bits.buffer);
   const table = new Uint8ClampedArray(65536);
   for (let i = 0; i < 65536; i++) {
     bits[0] = i << 16;
@@ -50,7 +55,8 @@ function toneTable(scale, tone) {
 }
 
 function paintRadiance(pixels, values, table) {
-  const bits = new Uint32Array(values.buffer), count = values.length / 3;
+  const bits = new Uint32Array(values.buffer),
+    count = values.length / 3;
   for (let i = 0, at = 0; i < count; i++) {
     pixels[at++] = table[((bits[i] + 0x8000) >>> 16) & 65535];
     pixels[at++] = table[((bits[i + count] + 0x8000) >>> 16) & 65535];

@@ -2,10 +2,18 @@
 
 const $ = (id) => document.getElementById(id);
 const state = {
-  scene: null, left: null, right: null, // which images
-  layout: "split", split: 0.5,
-  view: "reflected", map: "image", tone: "gamma", stops: 0,
-  zoom: 1, x: 0, y: 0, // screen pixels per image pixel; the point of the image in the middle
+  scene: null,
+  left: null,
+  right: null, // which images
+  layout: "split",
+  split: 0.5,
+  view: "reflected",
+  map: "image",
+  tone: "gamma",
+  stops: 0,
+  zoom: 1,
+  x: 0,
+  y: 0, // screen pixels per image pixel; the point of the image in the middle
   pointer: null, // the pixel [x, y] under the pointer
 };
 
@@ -16,7 +24,7 @@ function panes() {
   const { clientWidth: width, clientHeight: height } = $("canvas");
   if (state.layout !== "grid") return [{ image: state.left, x: 0, y: 0, width, height }];
   const { images } = state.scene;
-  const shape = (width / height) / (state.scene.width / state.scene.height);
+  const shape = width / height / (state.scene.width / state.scene.height);
   const columns = clamp(Math.round(Math.sqrt(images.length * shape)), 1, images.length);
   const rows = Math.ceil(images.length / columns);
   return images.map((image, i) => ({
@@ -36,7 +44,8 @@ function fit() {
 }
 
 function draw() {
-  const canvas = $("canvas"), ratio = devicePixelRatio;
+  const canvas = $("canvas"),
+    ratio = devicePixelRatio;
   const width = Math.round(canvas.clientWidth * ratio);
   const height = Math.round(canvas.clientHeight * ratio);
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
@@ -45,7 +54,8 @@ function draw() {
   context.clearRect(0, 0, width, height);
   for (const pane of panes()) drawPane(context, pane, pane.image, pane.x, pane.width);
   if (state.layout === "split") {
-    const [pane] = panes(), from = state.split * pane.width;
+    const [pane] = panes(),
+      from = state.split * pane.width;
     context.clearRect(from, 0, pane.width - from, pane.height);
     drawPane(context, pane, state.right, from, pane.width - from);
   }
@@ -60,8 +70,13 @@ function drawPane(context, pane, image, from, width) {
   context.clip();
   context.imageSmoothingEnabled = zoom * devicePixelRatio < 1;
   context.imageSmoothingQuality = "high";
-  context.drawImage(canvasOf(scene, image, state), pane.x + pane.width / 2 - x * zoom,
-    pane.y + pane.height / 2 - y * zoom, scene.width * zoom, scene.height * zoom);
+  context.drawImage(
+    canvasOf(scene, image, state),
+    pane.x + pane.width / 2 - x * zoom,
+    pane.y + pane.height / 2 - y * zoom,
+    scene.width * zoom,
+    scene.height * zoom,
+  );
   if (state.layout !== "single") drawName(context, pane, image, from, width);
   context.restore();
 }
@@ -93,7 +108,8 @@ function toImage(px, py) {
 
 /** Zoom by `factor`; the point of the image under (px, py) stays there. */
 function zoomAt(px, py, factor) {
-  const [x, y] = toImage(px, py), old = state.zoom;
+  const [x, y] = toImage(px, py),
+    old = state.zoom;
   state.zoom = clamp(old * factor, 0.05, 100);
   state.x = x + (state.x - x) * (old / state.zoom);
   state.y = y + (state.y - y) * (old / state.zoom);
@@ -120,7 +136,9 @@ function point(px, py) {
 
 /** One pointer moves, two zoom; the wheel zooms; the line between the halves is dragged. */
 function listenToPointers() {
-  const canvas = $("canvas"), divider = $("divider"), down = new Map();
+  const canvas = $("canvas"),
+    divider = $("divider"),
+    down = new Map();
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -133,29 +151,37 @@ function listenToPointers() {
     point(...place(event));
   });
   canvas.addEventListener("pointermove", (event) => {
-    const old = down.get(event.pointerId), now = place(event);
+    const old = down.get(event.pointerId),
+      now = place(event);
     if (!old || down.size === 1) point(...now);
     if (!old) return;
     const before = [...down.values()];
     down.set(event.pointerId, now);
     if (down.size === 1) return move(now[0] - old[0], now[1] - old[1]);
     const after = [...down.values()];
-    const from = middle(before), to = middle(after);
+    const from = middle(before),
+      to = middle(after);
     zoomAt(...from, distance(after) / Math.max(distance(before), 1));
     move(to[0] - from[0], to[1] - from[1]);
   });
   for (const kind of ["pointerup", "pointercancel"])
     canvas.addEventListener(kind, (event) => down.delete(event.pointerId));
-  canvas.addEventListener("pointerleave", () => { state.pointer = null; refresh(); });
+  canvas.addEventListener("pointerleave", () => {
+    state.pointer = null;
+    refresh();
+  });
   canvas.addEventListener("dblclick", fit);
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoomAt(...place(event), Math.exp(-0.002 * event.deltaY * (event.deltaMode ? 30 : 1)));
-  }, { passive: false });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      zoomAt(...place(event), Math.exp(-0.002 * event.deltaY * (event.deltaMode ? 30 : 1)));
+    },
+    { passive: false },
+  );
   divider.addEventListener("pointerdown", (event) => divider.setPointerCapture(event.pointerId));
   divider.addEventListener("pointermove", (event) => {
-    if (divider.hasPointerCapture(event.pointerId))
-      setSplit(place(event)[0] / canvas.clientWidth);
+    if (divider.hasPointerCapture(event.pointerId)) setSplit(place(event)[0] / canvas.clientWidth);
   });
   // After dragging, the arrows flip images again; who came by Tab moves the line with them.
   divider.addEventListener("pointerup", () => divider.blur());
