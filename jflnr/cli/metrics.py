@@ -3,7 +3,8 @@
 A is what to judge: a file that `jflnr denoise` wrote (its layer `indirect`), or a frame (its noisy
 layer `indirect_N`, N from --spp). B is a frame with the layers `albedo` and `reference`; without B,
 A is measured against its own reference.
-If neither file has a layer `reference`, their plain R, G, B are compared, B being the reference.
+If neither file has a layer `reference`, their pictures are compared, B being the reference: the
+plain R, G, B, or what another program calls its picture (Blender's Combined).
 
 PSNR, SSIM and FLIP are taken on the pictures as displayed (albedo * light, mean of the reference
 brought to 0.35, clipped, gamma 2.2); rMSE, SMAPE and the squared errors on linear radiance.
@@ -55,9 +56,10 @@ def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:
 
 
 def _plain(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
-    if missing := [c for c in "RGB" if c not in channels]:
+    picture = tuple("RGB") if "R" in channels else layouts.recognise(channels).picture[:3]
+    if missing := [c for c in picture or "RGB" if c not in channels]:
         raise ValueError(
             f"{path}: nothing to compare: B holds no layer reference, and the plain channel "
             f"{missing[0]} is missing here"
         )
-    return np.stack([channels[c].astype(np.float32) for c in "RGB"], axis=-1)
+    return np.stack([channels[c].astype(np.float32) for c in picture], axis=-1)

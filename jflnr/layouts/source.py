@@ -56,7 +56,7 @@ def recognise(channels: Mapping[str, np.ndarray], spp: int | None = None) -> Lay
         for program in (blender, pbrt, mitsuba, common):
             if (found := program.layout(channels)) is not None:
                 return found
-    return native.layout(spp or (counts or [1])[0], counts)
+    return native.layout(spp or (counts or [1])[0], channels)
 
 
 def parse_header(comments: str) -> dict:

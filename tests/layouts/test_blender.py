@@ -1,5 +1,6 @@
 """Blender's files: by the names of both generations, and (slow) as the real program writes them."""
 
+import json
 import os
 import re
 import subprocess
@@ -126,6 +127,15 @@ def test_a_missing_pass_says_where_to_switch_it_on(
     exr.write_channels(tmp_path / "a.exr", left)
     with pytest.raises(ValueError, match=f"layer ViewLayer.{name} is missing; {advice}"):
         read_frame(tmp_path / "a.exr")
+
+
+def test_metrics_find_the_picture(
+    blender_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = {c: beauty(blender_file)[..., i] for i, c in enumerate("RGB")}
+    exr.write_channels(tmp_path / "same.exr", picture)
+    assert main(["metrics", str(tmp_path / "same.exr"), str(blender_file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["mse"] == 0
 
 
 @pytest.mark.usefixtures("identity")
