@@ -7,6 +7,11 @@ function step(side, by) {
   choose(side, turn(state.scene.images, state[side], by));
 }
 
+function swap() {
+  [state.left, state.right] = [state.right, state.left];
+  refresh();
+}
+
 function next(name) {
   if ($(name).parentElement.hidden) return;
   state[name] = turn(options(name), state[name], 1);
@@ -32,7 +37,7 @@ const SHORTCUTS = [
   },
   {
     shown: "x",
-    keys: { x: () => (([state.left, state.right] = [state.right, state.left]), refresh()) },
+    keys: { x: swap },
     text: "swap left and right",
   },
   { shown: "l", keys: { l: () => next("layout") }, text: "layout: one, split, all" },
@@ -69,6 +74,7 @@ function onKey(event) {
   // The browser has its own keys with Ctrl, Alt and Meta; fields keep arrows, Home, Enter ...
   if (event.ctrlKey || event.altKey || event.metaKey || $("help").open) return;
   if (event.target.matches("select, input") && event.key.length > 1) return;
+  if (/^Arrow(Up|Down)$/.test(event.key) && CONTENT.scenes.length < 2) return; // they scroll
   const arrow = /^Arrow(Left|Right)$/.exec(event.key);
   const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code);
   if (event.target === $("divider") && arrow)
@@ -98,5 +104,4 @@ function buildHelp() {
     ),
   );
   $("help-button").addEventListener("click", () => $("help").showModal());
-  document.addEventListener("keydown", onKey);
 }

@@ -49,6 +49,7 @@ async function start() {
   listenToControls();
   await showScene(0);
   listenToPointers();
+  document.addEventListener("keydown", onKey);
   new ResizeObserver(() => refresh()).observe($("stage"));
 }
 

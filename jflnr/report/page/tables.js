@@ -172,11 +172,11 @@ function datasets(rows, x, key) {
   ];
 }
 
-/** The rows that no faster one equals. */
+/** The rows that no faster one equals, the fastest first. */
 function front(rows, x, key) {
   const sign = CONTENT.lower.includes(key) ? -1 : 1;
-  let best = -Infinity;
-  return sorted(rows, x, true).filter(
-    (row) => sign * row[key] > best && ((best = sign * row[key]), true),
-  );
+  const best = [];
+  for (const row of sorted(rows, x, true))
+    if (!best.length || sign * row[key] > sign * best.at(-1)[key]) best.push(row);
+  return best;
 }
