@@ -41,6 +41,8 @@ def assemble(source: Source) -> Layers:
         images |= _derived(images, camera, source.attributes.window)
     if layout.light != "indirect" or "beauty" in layout.channels:
         images |= _separated(images)
+    if layout.motion_up and images["motion"] is not None:
+        images["motion"] = images["motion"] * np.array([1, -1], np.float32)
     return {name: images[name] for name in LAYERS}
 
 

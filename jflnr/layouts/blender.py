@@ -2,10 +2,11 @@
 
 Facts taken from files that Blender 4.5 and 5.0 wrote (tests/layouts/test_blender.py): the light
 passes are divided by the pass `Diffuse Color`, all passes together sum to `Combined`, the depth is
-measured along the view axis and 1e10 where nothing is hit, and normals face the camera.
+measured along the view axis and 1e10 where nothing is hit, normals face the camera, and motion
+counts upwards.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -28,7 +29,9 @@ GUIDES = {
     "normal": ("Normal", "Denoising Normal"),
     "depth": ("Depth", "Denoising Depth"),
     "position": ("Position",),
+    "motion": ("Vector",),  # X, Y: to where the point was, upwards; Z, W: from where it will be
 }
+NEEDED = {"albedo": "Diffuse Color", "normal": "Normal", "depth": "Depth"}
 AO = ("Ambient Occlusion", "AO")
 
 ADVICE = {
@@ -47,30 +50,32 @@ NOISY_AO = (
 
 
 def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
-    """The first view layer that can be denoised, or None if this is no file of Blender's."""
+    """That of the view layer with the most passes, or None if this is no file of Blender's."""
     views = _views(channels)
     if not views:
         return None
     view = max(views, key=lambda view: _usefulness(views[view]))
-    passes = views[view]
-    light = _find(passes, PASSES)
-    notes = []
-    if "indirect" not in light or "albedo" not in light:
-        light = _find(passes, WHOLE_PICTURE)
-        notes.append(WHOLE_NOTE.format(light.get("albedo", "albedo")))
-    if ao := _find(passes, {"ao": AO}).get("ao"):
-        notes.append(NOISY_AO.format(_layer(view, ao)))
-    if len(views) > 1:
-        others = ", ".join(sorted(set(views) - {view}))
-        notes.append(f"view layer {view} is used; the file also holds {others}")
-    wanted = {"albedo": "Diffuse Color", "normal": "Normal", "depth": "Depth"}
-    chosen = wanted | light | _find(passes, GUIDES | {"beauty": BEAUTY})
-    names = {layer: in_layer(channels, _layer(view, name)) for layer, name in chosen.items()}
-    missing = {layer: (f"{_layer(view, wanted[layer])}.R",) for layer in names if not names[layer]}
+    light = _find(views[view], PASSES)
+    if not {"indirect", "albedo"} <= set(light):
+        light = _find(views[view], WHOLE_PICTURE)
+    chosen = NEEDED | light | _find(views[view], GUIDES | {"beauty": BEAUTY})
+    stems = {layer: _layer(view, name) for layer, name in chosen.items()}
+    names = {layer: in_layer(channels, stem) or (f"{stem}.R",) for layer, stem in stems.items()}
+    names |= {"motion": names["motion"][:2]} if "motion" in names else {}
     combined = _layer(view, "Combined")
-    alpha = f"{combined}.A"
-    picture = in_layer(channels, combined) + ((alpha,) if alpha in channels else ())
-    return Layout("Blender", names | missing, picture, tuple(notes), ADVICE)
+    alpha = tuple({f"{combined}.A"} & set(channels))
+    picture = in_layer(channels, combined) + alpha
+    notes = tuple(_notes(view, views, chosen))
+    return Layout("Blender", names, picture, notes, ADVICE, motion_up=True)
+
+
+def _notes(view: str, views: Mapping[str, set[str]], chosen: Mapping[str, str]) -> Iterator[str]:
+    if "indirect" not in chosen:
+        yield WHOLE_NOTE.format(chosen["albedo"])
+    if ao := _find(views[view], {"ao": AO}):
+        yield NOISY_AO.format(_layer(view, ao["ao"]))
+    if others := sorted(set(views) - {view}):
+        yield f"view layer {view} is used; the file also holds {', '.join(others)}"
 
 
 def _views(channels: Iterable[str]) -> dict[str, set[str]]:

@@ -42,6 +42,7 @@ class Layout:
     picture: tuple[str, ...] = ()  # where the program keeps the picture: R, G, B and maybe alpha
     notes: tuple[str, ...] = ()  # what a user should know about it
     advice: Mapping[str, str] = field(default_factory=dict)  # how to have a missing layer written
+    motion_up: bool = False  # motion counts upwards; in a Frame it counts downwards, as rows do
 
     @property
     def light(self) -> str:

@@ -25,6 +25,7 @@ def passes(frame: Frame, view: str = "ViewLayer", old: bool = False) -> dict[str
         "Normal": ("XYZ", frame.normal),
         "Depth": ("Z", depth),
         "Position": ("XYZ", frame.position),
+        "Vector": ("XYZW", np.concatenate([[1, -1] * frame.motion, 5 + 0 * frame.motion], -1)),
         "Ambient Occlusion": ("RGB", np.repeat(frame.ao.round(), 3, -1)),
     }
     return {

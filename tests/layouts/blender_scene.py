@@ -2,8 +2,9 @@
 
     python blender_scene.py OUT WIDTH HEIGHT SAMPLES PASSES [SCRIPT]
 
-PASSES is `all`, `denoising` (only what `Denoising Data` gives) or `denoised` (both, with Blender's
-own denoiser on). With SCRIPT, that example is run on the scene instead, and its picture saved.
+PASSES is `all`, `denoising` (only what `Denoising Data` gives), `denoised` (both, with Blender's
+own denoiser on) or `moving` (all, and the cube has come from 0.4 to the left and 0.1 below).
+With SCRIPT, that example is run on the scene instead, and its picture saved.
 """
 
 import runpy
@@ -17,7 +18,7 @@ LIGHT = [
     for kind in ("diffuse", "glossy", "transmission")
     for part in ("direct", "indirect", "color")
 ]
-PASSES = [*LIGHT, "emit", "environment", "ambient_occlusion", "normal", "z", "position"]
+PASSES = [*LIGHT, "vector", "emit", "environment", "ambient_occlusion", "normal", "z", "position"]
 
 
 def material(colour, metallic=0.0, glow=0.0):
@@ -60,13 +61,23 @@ def write(scene, path, passes):
     layer, image = scene.view_layers[0], scene.render.image_settings
     for name in PASSES if passes != "denoising" else ():
         setattr(layer, f"use_pass_{name}", True)
-    layer.cycles.denoising_store_passes = passes != "all"
+    if passes == "moving":
+        move(scene, bpy.data.objects["Cube"])
+    layer.cycles.denoising_store_passes = passes.startswith("denois")
     scene.cycles.use_denoising = passes == "denoised"
     if hasattr(image, "media_type"):
         image.media_type = "MULTI_LAYER_IMAGE"
     image.file_format, image.color_depth = "OPEN_EXR_MULTILAYER", "32"
     scene.render.filepath = path
     bpy.ops.render.render(write_still=True)
+
+
+def move(scene, cube):
+    here = cube.location.copy()
+    for frame, (x, z) in enumerate(((-0.4, -0.1), (0, 0), (1, 1)), start=1):
+        cube.location = here.x + x, here.y, here.z + z
+        cube.keyframe_insert("location", frame=frame)
+    scene.frame_set(2)
 
 
 def main(path, width, height, samples, passes, script=""):

@@ -42,6 +42,7 @@ def test_layers_are_those_of_the_passes(blender_file: Path, frame: Frame) -> Non
     np.testing.assert_array_equal(read.albedo[5:], frame.albedo[5:])
     np.testing.assert_array_equal(read.normal, frame.normal)
     np.testing.assert_array_equal(read.position, frame.position)
+    np.testing.assert_array_equal(read.motion, frame.motion)
     assert read.ao is None  # one ray per sample would be noise, not a guide
 
 
@@ -232,6 +233,18 @@ def test_what_is_known_of_blenders_passes(blender: Path, tmp_path: Path) -> None
     assert ((ray * read.normal[hit]).sum(-1) < 0).all()
     np.testing.assert_allclose(np.linalg.norm(read.normal[hit], axis=-1), 1, atol=1e-3)
     assert (~hit).any() and read.emission.min() > -1e-4
+
+
+@pytest.mark.slow
+def test_motion_leads_to_where_a_point_was(blender: Path, tmp_path: Path) -> None:
+    """The cube has come from 0.4 to the left and 0.1 below: in pixels, at its distance."""
+    render(blender, tmp_path / "a.exr", 96, 64, 1, "moving")
+    read = read_frame(tmp_path / "a.exr")
+    cube = read.albedo[..., 1] > 1.5 * read.albedo[..., 0]
+    pixels = 48 / np.tan(np.radians(39.6) / 2) / read.depth[cube]
+    x, y = (read.motion[cube] / pixels).T
+    np.testing.assert_allclose(x, -0.4, atol=0.02)
+    np.testing.assert_allclose(y, 0.1 * np.sin(1.35), atol=0.02)
 
 
 @pytest.mark.slow
