@@ -1,10 +1,12 @@
 """What several commands share: how errors read, how numbers are shown."""
 
 import argparse
+import contextlib
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TextIO
 
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
@@ -27,6 +29,16 @@ def sentence(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return " ".join(str(error).split()) or type(error).__name__
+
+
+@contextlib.contextmanager
+def voices() -> Iterator[tuple[TextIO, TextIO]]:
+    """stdout and stderr that are heard also while a thread has OpenEXR's own remarks silenced."""
+    if sys.stderr is not sys.__stderr__:
+        yield sys.stdout, sys.stderr
+        return
+    with os.fdopen(os.dup(sys.stderr.fileno()), "w", buffering=1) as err:
+        yield sys.stdout, err
 
 
 def tinted(text: str, colour: str, stream: TextIO) -> str:

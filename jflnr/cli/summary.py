@@ -16,6 +16,13 @@ def remarks(record: dict[str, Any], quiet: bool) -> list[str]:
     return lines
 
 
+def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: float) -> str:
+    """Frames per second, and how long files kept a thread busy. exr: seconds by `read`, `write`."""
+    done = sum(record["status"] == "written" for record in records)
+    shares = ", ".join(f"{verb} EXR {spent / seconds:.0%}" for verb, spent in exr.items())
+    return f"{done} written in {seconds:.1f} s, {done / seconds:.2f} a second; {shares} of the time"
+
+
 def summary(record: dict[str, Any], verbose: bool) -> str:
     """Lines for stdout."""
     if record["status"] == "kept":

@@ -9,10 +9,13 @@ import psutil
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # Of what is free, when nobody says how much.
 SHARE = 0.5
-# Measured (docs/large.md): what the program takes before any frame, and bytes per pixel of a frame
-# that is denoised whole, of a piece that is worked on, and of a frame that is done in pieces.
+# Measured (docs/large.md): what the program takes before any frame; bytes per pixel of a frame that
+# is denoised whole, of a frame that waits in pieces, and of a piece with what it overlaps.
 BASE = 450 * 2**20
-WHOLE, PIECE, REST = 400, 420, 1
+WHOLE, REST = 320, 1
+PIECE = {"flr": 230, "flr-adaptive": 160}
+# Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` do.
+STRIP_OVERLAP, TILE_OVERLAP = 200, 1664
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
 
@@ -30,20 +33,35 @@ def free() -> int:
     return int(SHARE * psutil.virtual_memory().available)
 
 
-def tile_for(height: int, width: int, memory: int) -> int | None:
+def tile_for(
+    height: int, width: int, memory: int, at_once: int = 1, method: str = "flr"
+) -> int | None:
     """The side of the pieces for a frame of this size, or None if it may be denoised whole.
 
+    memory: bytes that may be taken. at_once: how many whole frames are in memory together.
     Raises ValueError if even the smallest pieces would take more.
     """
     pixels = height * width
-    if BASE + WHOLE * pixels <= memory:
+    if BASE + at_once * WHOLE * pixels <= memory:
         return None
-    left = memory - BASE - REST * pixels
-    side = int(max(left, 0) / PIECE) ** 0.5
+    side = 0.0
+    area = (memory - BASE - REST * pixels) / PIECE.get(method, max(PIECE.values()))
+    if method == "flr":
+        side = max(area - STRIP_OVERLAP * width, 0) ** 0.5
+    elif area > 0:
+        side = area**0.5 - TILE_OVERLAP
     if side < SMALLEST:
-        least = (BASE + REST * pixels + PIECE * SMALLEST**2) / 2**20
         raise ValueError(
-            f"--memory: {width} x {height} pixels need at least {least:.0f}M; "
-            f"{memory / 2**20:.0f}M are allowed"
+            f"--memory: {memory / 2**20:.0f}M are too little for {width} x {height} pixels with "
+            f"{method}; about {_least(pixels, width, method) / 2**20:.0f}M are needed"
         )
     return int(side) // 32 * 32
+
+
+def _least(pixels: int, width: int, method: str) -> int:
+    """Bytes that the smallest pieces take."""
+    if method == "flr":
+        area = SMALLEST**2 + STRIP_OVERLAP * width
+    else:
+        area = (SMALLEST + TILE_OVERLAP) ** 2
+    return BASE + REST * pixels + PIECE.get(method, max(PIECE.values())) * area

@@ -87,7 +87,8 @@ def strips(
     scene = scene_of(rows)
     shift = shift_of(rows, lambda frame: steps.guides_of(frame, names, scene))
     common = Common(scene, shift, parameters.numbers())
-    finest, height = max(block // 2, 1), max(tile * tile // rows.width, 1)
+    # Strips do not overlap, so small ones cost nothing.
+    finest, height = max(block // 2, 1), max(tile * tile // (4 * rows.width), 1)
     job = Job(rows, common, names, finest, height, tile, folder)
     guides = common.shift.size
     with ExitStack() as files:

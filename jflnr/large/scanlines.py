@@ -21,6 +21,8 @@ from jflnr.layouts.source import recognise
 
 # Rows that are decoded at a time; every compression packs a divisor of it together.
 BATCH = 64
+# What `layouts.assemble` makes a frame's layers of, whichever are asked for.
+NEEDED = ("indirect", "radiance", "beauty", "albedo", "normal", "depth")
 
 
 def _openimageio() -> Any:
@@ -61,7 +63,7 @@ class Scanlines:
 
     def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
         """Rows `start` to `stop` of the channels that make up these layers of a frame."""
-        wanted = {"beauty", "radiance", *layers}
+        wanted = {*NEEDED, *layers}
         names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
         channels = self._read(start, stop, sorted(names & set(self.channels)))
         (x, y), display = self.attributes.window

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from jflnr import guides as guide_layers
 from jflnr.denoising import Part, denoise_flr, support_of
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.parameters import DEFAULT
 from jflnr.frame import Array, Frame
 from jflnr.large import local, pyramid
 from jflnr.large.local import Strip
 from jflnr.large.source import Rows, rows_of, scene_of, shift_of
 
-__all__ = ["Options", "Strip", "denoise", "rows_of"]
+__all__ = ["Options", "Strip", "denoise", "options", "rows_of"]
 
 
 class Options(NamedTuple):
@@ -25,6 +27,14 @@ class Options(NamedTuple):
     block: int
     backend: str = "jax"
     keep_energy: bool = False
+
+
+def options(settings: Mapping[str, Any], names: tuple[str, ...]) -> Options:
+    """From keyword arguments of `jflnr.denoise`."""
+    method = settings["method"]
+    default = DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
+    parameters = settings.get("parameters") or default
+    return Options(method, parameters, names, settings["block"], settings["backend"])
 
 
 def denoise(rows: Rows, options: Options, tile: int, folder: Path | None = None) -> Iterator[Strip]:
@@ -50,6 +60,8 @@ def denoise(rows: Rows, options: Options, tile: int, folder: Path | None = None)
 
         height = max(tile * tile // rows.width, 1)
         return local.strips(rows, one, height=height, block=block, support=support)
+    if method != "flr-adaptive":
+        raise ValueError(f"method {method} needs the whole frame in memory")
     return pyramid.strips(
         rows, names, parameters, block=block, tile=tile, keep_energy=keep_energy, folder=folder
     )

@@ -1,0 +1,254 @@
+"""One frame of `jflnr denoise` in three stages: read, denoise, write."""
+
+import argparse
+import dataclasses
+import json
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jflnr import layouts
+from jflnr.cli.common import INPUT_ERRORS, sentence
+from jflnr.cli.jobs import Job, make_folder
+
+if TYPE_CHECKING:
+    from jflnr.frame import Frame
+
+# What became of a frame, as JSON can hold it.
+Record = dict[str, Any]
+
+DIRECT = "Direct light is left as it was rendered; --direct denoises it too."
+
+
+class Loaded(NamedTuple):
+    """A frame that was read; `tile` is set instead for one that is to be denoised in pieces."""
+
+    job: Job
+    source: layouts.Source | None = None
+    frame: "Frame | None" = None
+    tile: int | None = None
+
+
+class Denoised(NamedTuple):
+    """A frame with its denoised light, by layer."""
+
+    job: Job
+    source: layouts.Source
+    frame: "Frame"
+    lights: dict[str, np.ndarray]
+    about: dict[str, Any]
+    record: Record
+
+
+@dataclass
+class Denoiser:
+    """Denoises files. Calling it does all of a frame's stages; threads may share them.
+
+    A stage returns a record where nothing is left to do: the frame is there, has failed or is
+    written; later stages pass that on.
+
+    settings: keyword arguments of `jflnr.denoise`. arguments: of the command line. memory: bytes
+    that frames may take, None for a share of what is free. at_once: how many there may be in
+    memory. compiled: shapes of the frames
+    there are programs for, None if nobody asks.
+    """
+
+    settings: dict[str, Any]
+    arguments: argparse.Namespace
+    memory: int | None
+    at_once: int = 1
+    compiled: set[tuple] | None = field(default_factory=set)
+    exr_seconds: dict[str, float] = field(default_factory=lambda: {"read": 0.0, "write": 0.0})
+
+    def __call__(self, job: Job) -> Record:
+        return self.write(self.denoise(self.read(job)))
+
+    def read(self, job: Job) -> Loaded | Record:
+        """The frame in memory, or only how large its pieces are to be."""
+        outputs = [job.target, job.preview] if self.arguments.png else [job.target]
+        kept = [str(path) for path in outputs if path.exists()]
+        if kept and not self.arguments.overwrite:
+            return _record(job) | {"status": "kept", "kept": kept}
+        return self._reported(job, lambda: self._read(job))
+
+    def denoise(self, loaded: Loaded | Record) -> Denoised | Record:
+        if isinstance(loaded, dict):
+            return loaded
+        return self._reported(loaded.job, lambda: self._denoise(loaded))
+
+    def write(self, denoised: Denoised | Record) -> Record:
+        if isinstance(denoised, dict):
+            return denoised
+        return self._reported(denoised.job, lambda: self._write(denoised))
+
+    def _reported(self, job: Job, stage: Callable[[], Any]) -> Any:
+        """What the stage returns, or the record of why it failed."""
+        try:
+            return stage()
+        except INPUT_ERRORS as error:
+            return failure(job, error)
+
+    def _read(self, job: Job) -> Loaded:
+        from jflnr import exr
+        from jflnr.frame import frame_of
+        from jflnr.large import memory
+
+        start = time.perf_counter()
+        size, method = exr.read_attributes(job.source).size, self.settings["method"]
+        make_folder(job.target)
+        bound = self.memory or memory.free()
+        if tile := memory.tile_for(*size, bound, self.at_once, method):
+            return Loaded(job, tile=tile)
+        source = layouts.load(job.source, self.arguments.spp, dict(self.arguments.map))
+        self.exr_seconds["read"] += time.perf_counter() - start
+        return Loaded(job, source, frame_of(source))
+
+    def _denoise(self, loaded: Loaded) -> Denoised | Record:
+        from jflnr.denoising import denoise
+        from jflnr.metrics import measure
+
+        job, source, frame, tile = loaded
+        arguments, settings = self.arguments, self.settings
+        if source is None or frame is None:
+            from jflnr.cli.strips import denoise_in_strips
+
+            assert tile is not None
+            return _record(job) | denoise_in_strips(job, settings, arguments, tile)
+        noisy = with_direct(frame, job.source) if arguments.direct else frame
+        if arguments.reference and frame.reference is None:
+            raise ValueError(
+                f"{job.source}: --reference needs a layer reference, and there is none"
+            )
+        shapes = tuple(getattr(image, "shape", None) for image in vars(noisy).values())
+        times = [time.perf_counter()]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", UserWarning)
+            # The first frame of a kind is denoised twice, to tell compiling from denoising.
+            for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
+                light = np.asarray(denoise(noisy, **settings), np.float32)
+                times.append(time.perf_counter())
+        if self.compiled is not None:
+            self.compiled.add(shapes)
+        about = about_of(frame, settings, spp_of(source, arguments))
+        lights = split(light)
+        # Our own files hold converged direct light; other programs' is as noisy as the rest.
+        left = about["spp"] is None and frame.direct is not None and not arguments.direct
+        record = {
+            "width": light.shape[1],
+            "height": light.shape[0],
+            "layout": source.layout.program,
+            "notes": list(source.layout.notes),
+            **about,
+            "seconds": times[-1] - times[-2],
+            "compile_seconds": times[-2] - times[0],
+            "warnings": [
+                *{str(warning.message): None for warning in caught},
+                *_not_finite(frame),
+                *([DIRECT] if left else []),
+            ],
+        }
+        if arguments.profile:
+            from jflnr.opencl.context import default_context
+            from jflnr.opencl.profile import profile
+
+            rows = profile(default_context(), lambda: denoise(noisy, **settings))
+            record["profile"] = [row._asdict() for row in rows]
+        if arguments.reference:
+            images = {"noisy": frame.indirect, "denoised": lights["indirect"]}
+            record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
+        return Denoised(job, source, frame, lights, about, record)
+
+    def _write(self, done: Denoised) -> Record:
+        start = time.perf_counter()
+        _write(done, self.arguments)
+        self.exr_seconds["write"] += time.perf_counter() - start
+        return _record(done.job) | {"status": "written"} | done.record
+
+
+def failure(job: Job, error: BaseException) -> Record:
+    """The record of a frame that failed."""
+    text = sentence(error)
+    named = any(str(path) in text for path in (job.source, job.target, job.preview))
+    text = text if named else f"{job.source}: {text}"
+    return _record(job) | {"status": "failed", "error": text}
+
+
+def _record(job: Job) -> Record:
+    return {"input": str(job.source), "output": str(job.target)}
+
+
+def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
+    """The samples per pixel of a file of ours."""
+    return arguments.spp if layouts.native.spp_present(source.channels) else None
+
+
+def split(light: np.ndarray) -> dict[str, np.ndarray]:
+    """Denoised light `(H, W, 3)` or `(H, W, 6)` by layer."""
+    lights = {"indirect": light[..., :3]}
+    return lights | ({"direct": light[..., 3:]} if light.shape[-1] > 3 else {})
+
+
+def with_direct(frame: "Frame", path: Path) -> "Frame":
+    """The frame whose light to denoise, (H, W, 6), is the indirect and the direct one."""
+    if frame.direct is None:
+        raise ValueError(f"{path}: --direct needs a layer of direct light, and there is none")
+    light = np.concatenate([frame.indirect, frame.direct], axis=-1)
+    return dataclasses.replace(frame, indirect=light)
+
+
+def _write(done: Denoised, arguments: argparse.Namespace) -> None:
+    """Write the preview, if asked for, and the EXR, with the input's header and windows."""
+    from jflnr import exr
+    from jflnr.cli.preview import write_preview
+    from jflnr.metrics import exposure
+
+    job, source, frame, lights, about, _ = done
+    picture = picture_of(frame, lights)
+    if arguments.png:
+        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
+        reflected = dataclasses.replace(frame, emission=None)
+        lit = picture_of(reflected, lights)
+        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
+    mask = None if frame.mask is None else np.asarray(frame.mask)
+    channels = layouts.output_channels(source, picture, lights, mask, arguments.channels)
+    comments = json.dumps(source.header | {"denoiser": about})
+    attributes = source.attributes
+    exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
+
+
+def picture_of(frame: "Frame", lights: dict[str, np.ndarray]) -> np.ndarray:
+    """The picture `(H, W, 3)` with the denoised light in it."""
+    from jflnr.frame import composite
+
+    frame = dataclasses.replace(frame, direct=lights.get("direct", frame.direct))
+    return np.asarray(composite(frame, lights["indirect"]), np.float32)
+
+
+def about_of(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[str, Any]:
+    """What was done, for the record and for the header of the output."""
+    from jflnr.guides import choose
+
+    model = settings.get("parameters")
+    names = ("sigma", "eps", "eps_prime") if model else ()
+    return {
+        "method": settings["method"],
+        "backend": settings["backend"],
+        "spp": spp,
+        "guides": list(choose(frame, settings["guides"])),
+        "block": settings["block"],
+        **{name: float(getattr(model, name)) for name in names},
+    }
+
+
+def _not_finite(frame: "Frame") -> list[str]:
+    from jflnr.frame import not_finite
+
+    if not (counts := not_finite(frame)):
+        return []
+    listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
+    return [f"pixels that are NaN or infinite (the fit leaves them out): {listed}"]

@@ -1,0 +1,89 @@
+"""A frame of `jflnr denoise` that is too large for memory: in strips, from file to file."""
+
+import argparse
+import contextlib
+import dataclasses
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from jflnr import layouts
+from jflnr.cli.frames import about_of, picture_of, split, spp_of, with_direct
+from jflnr.cli.jobs import Job
+from jflnr.frame import Frame, frame_of
+from jflnr.large import strips
+from jflnr.large.scanlines import Scanlines, writing
+from jflnr.large.source import Rows
+
+# What the picture is put together from, and what the regression always reads.
+PICTURE = {"albedo", "direct", "emission", "mask"}
+ALWAYS = {"indirect", "normal", "depth", "mask"}
+
+
+def denoise_in_strips(
+    job: Job, settings: dict[str, Any], arguments: argparse.Namespace, tile: int
+) -> dict[str, Any]:
+    """Read, denoise and write a frame piece by piece; the record of it."""
+    _check(arguments)
+    start = time.perf_counter()
+    file = Scanlines(job.source, arguments.spp, dict(arguments.map))
+    first = file.part(0, 1, layouts.LAYERS)
+    about = about_of(frame_of(first), settings, spp_of(first, arguments))
+    comments = json.dumps(first.header | {"denoiser": about})
+    options = strips.options(settings, tuple(about["guides"]))
+    size, window = (file.height, file.width), file.attributes.window
+    with contextlib.ExitStack() as stack:
+        append = None
+        for top, light in strips.denoise(
+            _rows(file, options.names, arguments), options, tile, job.target.parent
+        ):
+            channels = _channels(file, top, light, arguments)
+            if append is None:
+                output = writing(job.target, size, list(channels), comments, window)
+                append = stack.enter_context(output)
+            append(channels)
+    return {
+        "status": "written",
+        "width": file.width,
+        "height": file.height,
+        "layout": file.layout.program,
+        "notes": [*file.layout.notes, f"in pieces of {tile} x {tile} pixels"],
+        **about,
+        "seconds": time.perf_counter() - start,
+        "compile_seconds": 0,
+        "warnings": [],
+    }
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    for option in ("png", "reference", "profile"):
+        if getattr(arguments, option):
+            raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
+    if arguments.channels == "all":
+        raise ValueError("--channels all needs the whole frame in memory: raise --memory")
+
+
+def _rows(file: Scanlines, names: tuple[str, ...], arguments: argparse.Namespace) -> Rows:
+    """What the denoiser reads."""
+    layers = ALWAYS | set(names) | ({"direct"} if arguments.direct else set())
+    rows = file.rows(layers)
+    if not arguments.direct:
+        return rows
+
+    def read(start: int, stop: int) -> Frame:
+        both = with_direct(rows.read(start, stop), file.path)
+        return dataclasses.replace(both, direct=None)
+
+    return dataclasses.replace(rows, read=read, channels=6)
+
+
+def _channels(
+    file: Scanlines, top: int, light: np.ndarray, arguments: argparse.Namespace
+) -> dict[str, np.ndarray]:
+    """What to write of a strip."""
+    part = file.part(top, top + light.shape[0], PICTURE)
+    frame, lights = frame_of(part), split(light)
+    picture = picture_of(frame, lights)
+    return layouts.output_channels(part, picture, lights, frame.mask, arguments.channels)

@@ -1,0 +1,107 @@
+"""Work on many machines, by Dask: one job at a time per worker, none lost, none done twice."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+# How often a job is given to another worker after the one that had it died.
+RETRIES = 3
+# For how many seconds a scheduler may be away, and how often it is looked for.
+PATIENCE, PAUSE = 600, 2
+
+
+def each(
+    address: str,
+    work: Callable[[Any], Any],
+    jobs: Sequence[Any],
+    failed: Callable[[Any, BaseException], Any],
+) -> Iterator[Any]:
+    """`work(job)` of every job on a cluster, in the order in which they are finished.
+
+    address: `tcp://HOST:PORT` of a scheduler; "" for a cluster of this machine's cores. work: must
+    see for itself what is done already: a job whose worker or scheduler went away is given out
+    again. failed: makes a result of a job and what went wrong with it.
+
+    Raises ImportError without Dask, OSError if no scheduler answers.
+    """
+    left = dict(enumerate(jobs))
+    with _cluster(address) as scheduler:
+        deadline = time.monotonic() + (PATIENCE if address else 0)
+        known = False
+        while left:
+            try:
+                with _client(scheduler) as client:
+                    known, deadline = True, time.monotonic() + PATIENCE
+                    for number, result, error in _finished(client, work, left):
+                        job = left.pop(number)
+                        yield result if error is None else failed(job, error)
+            except _connection_errors() as error:
+                if not known or time.monotonic() > deadline:
+                    raise OSError(f"--cluster: no scheduler answers at {scheduler}") from error
+                print(f"The scheduler at {scheduler} is gone; waiting for it.", file=sys.stderr)
+                time.sleep(PAUSE)
+
+
+def _finished(
+    client: Any, work: Callable[[Any], Any], left: dict[int, Any]
+) -> Iterator[tuple[int, Any, BaseException | None]]:
+    """Number, result and error of the jobs as they are finished."""
+    from distributed import as_completed
+
+    futures = {
+        client.submit(work, job, pure=False, retries=RETRIES): number
+        for number, job in left.items()
+    }
+    for future in as_completed(list(futures)):
+        if future.status == "cancelled":
+            raise ConnectionError("the scheduler forgot the job")
+        error = future.exception() if future.status == "error" else None
+        yield futures[future], None if error else future.result(), error
+        future.release()
+
+
+def cores() -> int:
+    """The cores that this process may use: the workers of a cluster on this machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[str]:
+    """The address of a scheduler: the one given, or of workers on this machine's cores."""
+    distributed = _distributed()
+    if address:
+        yield address
+        return
+    with ExitStack() as stack:
+        local = distributed.LocalCluster(
+            n_workers=cores(), threads_per_worker=1, dashboard_address=None, memory_limit=0
+        )
+        yield stack.enter_context(local).scheduler_address
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    with _distributed().Client(address, timeout=10, set_as_default=False) as client:
+        yield client
+
+
+def _connection_errors() -> tuple[type[BaseException], ...]:
+    from concurrent.futures import CancelledError
+
+    from distributed.client import FutureCancelledError
+    from distributed.comm.core import CommClosedError
+
+    return (OSError, TimeoutError, CancelledError, FutureCancelledError, CommClosedError)
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise ImportError("--cluster needs Dask: pip install 'jflnr[cluster]'") from None
+    return distributed
