@@ -26,11 +26,14 @@ class Scene:
     images: dict[str, np.ndarray]
     frame: Frame | None = None
     direct: dict[str, np.ndarray] = field(default_factory=dict)
-    size: tuple[int, int] = field(init=False)  # (H, W)
 
     def __post_init__(self) -> None:
         checks.same_size(**self.images, frame=self.frame and self.frame.albedo)
-        object.__setattr__(self, "size", next(iter(self.images.values())).shape[:2])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return next(iter(self.images.values())).shape[:2]
 
     def radiance(self, image: np.ndarray) -> np.ndarray:
         """What is measured, (H, W, 3) float64: the light that `image` reflects, or itself."""
