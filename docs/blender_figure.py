@@ -29,7 +29,7 @@ RUNS = {
 
 def main() -> None:
     OUT.mkdir(parents=True, exist_ok=True)
-    noisy, converged = (render(samples) for samples in (1, 256))
+    noisy, converged = (render(samples) for samples in (1, 128))
     files = {"one sample per pixel": noisy}
     for number, (name, options) in enumerate(RUNS.items()):
         files[name] = OUT / f"clean-{number}.exr"
@@ -47,7 +47,7 @@ def main() -> None:
 
 def render(samples: int) -> Path:
     path = OUT / f"{samples}.exr"
-    command = [BLENDER, SCENE, path, 480, 270, samples, "all"]
+    command = [BLENDER, SCENE, path, 400, 225, samples, "all"]
     if not path.exists():
         subprocess.run([str(part) for part in command], check=True, stdout=sys.stderr)
     return path
