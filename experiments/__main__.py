@@ -27,6 +27,8 @@ NAMES = (
     "lightgroups",
     "figure9",
     "complexity",
+    "error_map",
+    "large",
 )
 
 

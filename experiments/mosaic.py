@@ -20,20 +20,21 @@ def names() -> dict[str, list[str]]:
     return {part: [f"{stem}.{c}" for c in LAYERS[part]] for part, stem in stems.items()}
 
 
-def write(path: Path, height: int, width: int) -> None:
-    """A frame of any size with the layers `PARTS`, as half, in strips as high as a real frame."""
+def write(path: Path, height: int, width: int, first: int = 0) -> None:
+    """A frame of any size with the layers `PARTS`, as half; another one for each `first`."""
     frames = [layers(jflnr.read_frame(found)) for found in data.frames("train", "val", "test")]
     rows, columns, _ = frames[0].shape
     channels = [channel for group in names().values() for channel in group]
     with writing(path, (height, width), channels, kind="half") as append:
         for band, top in enumerate(range(0, height, rows)):
-            strip = strip_of(frames, band, -(-width // columns))[: height - top, :width]
+            strip = strip_of(frames, band, -(-width // columns), first)[: height - top, :width]
             append({name: strip[..., i] for i, name in enumerate(channels)})
 
 
-def strip_of(frames: list[np.ndarray], band: int, count: int) -> np.ndarray:
+def strip_of(frames: list[np.ndarray], band: int, count: int, first: int) -> np.ndarray:
     """`count` frames in a row, every other one mirrored; each band begins with another frame."""
-    chosen = [frames[(5 * band + i) % len(frames)][:, :: -1 if i % 2 else 1] for i in range(count)]
+    numbers = [(first + 5 * band + i) % len(frames) for i in range(count)]
+    chosen = [frames[k][:, :: -1 if i % 2 else 1] for i, k in enumerate(numbers)]
     return np.concatenate(chosen, axis=1)[:: -1 if band % 2 else 1]
 
 

@@ -86,7 +86,7 @@ def _cluster(address: str) -> Iterator[str]:
 
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
-    with _distributed().Client(address, timeout=10, set_as_default=False) as client:
+    with _distributed().Client(address, timeout=10) as client:
         yield client
 
 
