@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from jflnr.denoising import BACKENDS, METHODS, denoise
     from jflnr.flr.parameters import Parameters, load_parameters, save_parameters
     from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
+    from jflnr.uncertainty import denoise_with_error
 
 __version__ = "0.1.0"
 
@@ -17,6 +18,7 @@ __all__ = [
     "Parameters",
     "composite",
     "denoise",
+    "denoise_with_error",
     "load_parameters",
     "read_frame",
     "read_header",
@@ -24,7 +26,7 @@ __all__ = [
     "write_frame",
 ]
 
-_HOMES = ("jflnr.denoising", "jflnr.flr.parameters", "jflnr.frame")
+_HOMES = ("jflnr.denoising", "jflnr.flr.parameters", "jflnr.frame", "jflnr.uncertainty")
 
 
 def __getattr__(name: str) -> Any:

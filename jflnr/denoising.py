@@ -62,17 +62,7 @@ def denoise(
     checks.choice("method", method, METHODS)
     checks.choice("backend", backend, BACKENDS)
     checks.positive_integer("block", block)
-    names = guide_layers.choose(frame, guides)
-    inputs = frame_inputs(frame, names)
-    _check_sizes(inputs)
-    if guides is None and frame.ao is None:
-        warnings.warn(
-            "The frame has no ao layer, so the guides are normal and depth only; "
-            "shadows cast by indirect light may be lost.",
-            stacklevel=2,
-        )
-    if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
-        raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
+    names, inputs = prepare(frame, guides)
     if method == "flr-adaptive":
         settings = _parameters(parameters, ADAPTIVE_DEFAULT)
         if backend != "jax":
@@ -91,6 +81,22 @@ def denoise(
     rows = strips.rows_of(inputs)
     options = strips.Options(method, settings, names, block, backend, keep_energy)
     return np.concatenate([strip for _, strip in strips.denoise(rows, options, tile)])
+
+
+def prepare(frame: Frame, guides: Sequence[str] | None) -> tuple[tuple[str, ...], Frame]:
+    """Names of the guides to use, and the checked layers that denoising reads."""
+    names = guide_layers.choose(frame, guides)
+    inputs = frame_inputs(frame, names)
+    _check_sizes(inputs)
+    if guides is None and frame.ao is None:
+        warnings.warn(
+            "The frame has no ao layer, so the guides are normal and depth only; "
+            "shadows cast by indirect light may be lost.",
+            stacklevel=3,
+        )
+    if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
+        raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
+    return names, inputs
 
 
 class Part(NamedTuple):

@@ -40,6 +40,21 @@ class Pilot(NamedTuple):
     mean: jax.Array
 
 
+class Fitted(NamedTuple):
+    """The models of a frame, and what they were found by.
+
+    coefficients: `(Q + 1, C, h, w)`, of the finest blocks. coarsest, steps: all levels. shift:
+    `(Q,)`. mean: brightness of the frame. unit: what the light was divided by.
+    """
+
+    coefficients: jax.Array
+    coarsest: Fit
+    steps: list[Step]
+    shift: jax.Array
+    mean: jax.Array
+    unit: jax.Array
+
+
 def flr_adaptive(
     target: jax.Array,
     guides: Guides,
@@ -65,6 +80,22 @@ def flr_adaptive(
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
+    models = fit_frame(target, guides, parameters, block, levels, weight)
+    image = apply(models.coefficients, guides, models.shift, max(block // 2, 1))
+    if keep_energy:
+        image = rescale(image, light_of(target / models.unit), weight)
+    return image * models.unit
+
+
+def fit_frame(
+    target: jax.Array,
+    guides: Guides,
+    parameters: AdaptiveParameters,
+    block: int,
+    levels: int,
+    weight: jax.Array | None,
+) -> Fitted:
+    """Everything but the last pass over the pixels; arguments as of `flr_adaptive`."""
     check_regression(target, guides, None, weight, block, 1)
     checks.positive_integer("levels", levels)
     numbers = parameters.numbers()
@@ -76,10 +107,10 @@ def flr_adaptive(
     mean = frame_mean(moments, shift.size)
     pilot = Pilot(with_borders(fit_pilot(moments, mean, shift, numbers, block)), mean)
     grid = collect_grid(target, guides, shift, pilot, weight, numbers, block)
-    coefficients = fit_pyramid(grid, shift, target.shape[-1], levels, mean, numbers)
-    coefficients = restore(coefficients, moments, shift.size, numbers.slack)
-    image = apply(coefficients, guides, shift, block)
-    return unit * (rescale(image, light_of(target), weight) if keep_energy else image)
+    coarsest, steps = fit_levels(grid, shift, target.shape[-1], levels, mean, numbers)
+    merged = steps[-1].merged if steps else coarsest.coefficients
+    coefficients = restore(merged, moments, shift.size, numbers.slack)
+    return Fitted(coefficients, coarsest, steps, shift, mean, unit)
 
 
 def light_of(target: jax.Array) -> jax.Array:
