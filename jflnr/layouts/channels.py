@@ -82,6 +82,8 @@ def layer(
     if not part and not np.isfinite(image).any():
         raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
     count = len(LAYERS.get(name, "RGB"))
+    if count != 1 and len(names) not in (1, count):
+        raise ValueError(f"{source}: layer {stem} has {len(names)} channels instead of {count}")
     if count == 1 < len(names):
         return image.mean(axis=-1, keepdims=True)
     return np.repeat(image, count, axis=-1) if len(names) == 1 < count else image

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from jflnr import exr, layouts
 from jflnr.cli import main
-from jflnr.frame import Frame, read_frame, read_header, write_frame
+from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 
 USUAL = [
     ("Beauty.{RGB}", "VisibleDiffuse.{RGB}", "OptixNormals.{RGB}", "Z"),
@@ -153,3 +155,49 @@ def test_without_a_camera_nothing_is_made_up(tmp_path: Path, frame: Frame) -> No
 
 def test_ours_is_recognised_first(frame_file: Path) -> None:
     assert layouts.load(frame_file).layout.program == "jflnr"
+
+
+LAYER_NAMES = st.sampled_from(
+    "|V.Combined|V.DiffInd|V.Diffuse Direct|V.DiffCol|V.Normal|V.Depth|V.Vector|V.Emit|V.Position|"
+    "V.Denoising Albedo|Combined|Albedo|N|Ns|P|depth|nn|albedo|normal|a.b.albedo|indirect_1|"
+    "indirect_x|dd.y|.|emission|beauty|position|ao|mask".split("|")
+)
+PARTS = st.sampled_from("RGB RGBA XYZ XYZW XY Z T R A I xyz red,green,blue".split())
+
+
+PROGRAMS = [
+    {"V.Combined": "RGBA", "V.DiffCol": "RGB", "V.Normal": "XYZ", "V.Depth": "Z"},
+    {"": "RGB", "albedo": "RGB", "nn": "XYZ", "dd.y": "T"},
+    {"": "RGB", "Albedo": "RGB", "Ns": "XYZ", "P": "XYZ"},
+    {"indirect_1": "RGB", "albedo": "RGB", "normal": "XYZ", "depth": "Z"},
+    {"": "R"},
+]
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.sampled_from(PROGRAMS), st.dictionaries(LAYER_NAMES, PARTS, max_size=5))
+def test_any_names_give_a_frame_or_one_sentence(
+    program: dict[str, str], others: dict[str, str]
+) -> None:
+    """Never anything else; and what is written holds the picture where the file had it."""
+    names = [
+        f"{layer}.{part}" if layer else part
+        for layer, parts in (program | others).items()
+        for part in (parts.split(",") if "," in parts else parts)
+    ]
+    noise = np.random.default_rng(0).uniform(0.1, 1, (len(names), 4, 5)).astype(np.float32)
+    channels = dict(zip(names, noise, strict=True))
+    attributes = exr.Attributes("", "ZIP", 1, exr.Window(), {}, (4, 5))
+    source = layouts.Source(Path("a.exr"), channels, attributes, layouts.recognise(channels))
+    try:
+        images = layouts.assemble(source)
+    except ValueError as error:
+        assert str(error).startswith("a.exr: layer ") and "\n" not in str(error)
+        return
+    frame = Frame(**images)  # type: ignore[arg-type]
+    picture = composite(frame, frame.indirect)
+    written = layouts.output_channels(source, picture, {}, frame.mask, "all")
+    beauty = source.layout.channels.get("beauty", ())
+    for name in beauty:
+        np.testing.assert_allclose(written[name], channels[name], rtol=1e-4, atol=1e-5)
+    assert set(channels) <= set(written)
