@@ -19,7 +19,7 @@ def denoise_with_error(
     guides: Sequence[str] | None = None,
     parameters: AdaptiveParameters | None = None,
 ) -> tuple[Array, Array]:
-    """What `denoise(frame, "flr-adaptive")` gives, and its standard error (docs/error_map.md).
+    """What `denoise(frame, "flr-adaptive")` gives, and its standard error (docs/adaptive.md).
 
     No reference is needed. About nine pixels of ten are within 1.645 standard errors of the truth.
     frame, guides, parameters: as of `denoise`.
