@@ -30,7 +30,10 @@ def find_crops(scene: Scene, size: int = SIZE, count: int = COUNT) -> list[dict[
 
 def _spread(scene: Scene) -> np.ndarray:
     """How far the errors of the versions lie apart at every pixel, as displayed, (H, W)."""
-    lights = {name: np.nan_to_num(scene.radiance(image)) for name, image in scene.images.items()}
+    lights = {
+        name: np.nan_to_num(scene.radiance(image), posinf=0, neginf=0)
+        for name, image in scene.images.items()
+    }
     basis = lights.get(REFERENCE, list(lights.values())[-1])
     wanted = display(basis, exposure(basis))
     judged = [n for n in lights if n not in (NOISY, REFERENCE)] or list(lights)

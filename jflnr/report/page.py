@@ -87,8 +87,8 @@ def _image(scene: Scene, name: str, unit: float) -> dict[str, Any]:
     errors = _flip(scene, name) if measured else None
     return {
         "name": name,
-        "light": pack(scene.images[name] / unit),
-        "direct": pack(scene.direct[name] / unit) if name in scene.direct else None,
+        "light": pack(scene.images[name], unit),
+        "direct": pack(scene.direct[name], unit) if name in scene.direct else None,
         "flip": None if errors is None else _deflated(np.uint8(np.round(255 * errors)).tobytes()),
         "metrics": scene.measure(name) if measured else None,
     }
@@ -108,7 +108,7 @@ def _layers(frame: Frame, unit: float) -> dict[str, str]:
     found = {"albedo": pack(np.asarray(frame.albedo))}
     for name, image in (("direct", frame.direct), ("emission", frame.emission)):
         if image is not None:
-            found[name] = pack(np.asarray(image) / unit)
+            found[name] = pack(np.asarray(image), unit)
     return found
 
 
@@ -139,9 +139,10 @@ def _mean(image: np.ndarray) -> float:
     return float(np.mean(np.abs(image[np.isfinite(image)]), dtype=np.float64))
 
 
-def pack(image: np.ndarray) -> str:
+def pack(image: np.ndarray, unit: float = 1) -> str:
     """An (H, W, 3) image as base64 of deflated half floats: planes, high bytes before low ones."""
-    limited = np.clip(image, -HALF_MAX, HALF_MAX, where=np.isfinite(image), out=np.array(image))
+    scaled = np.asarray(image, np.float64) / unit
+    limited = np.clip(scaled, -HALF_MAX, HALF_MAX, where=np.isfinite(scaled), out=scaled)
     bits = np.ascontiguousarray(limited.transpose(2, 0, 1).astype(np.float16)).view(np.uint16)
     return _deflated(np.stack([bits >> 8, bits & 255]).astype(np.uint8).tobytes())
 

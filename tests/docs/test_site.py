@@ -12,6 +12,7 @@ from sybil.parsers import markdown
 
 from jflnr import exr
 from jflnr.cli import main
+from jflnr.flr.parameters import DEFAULT, save_parameters
 from jflnr.frame import Frame, write_frame
 from tests.layouts.blender_passes import passes
 
@@ -40,6 +41,7 @@ def test_every_block_has_a_language(page: Path) -> None:
 @pytest.fixture
 def folder(tmp_path: Path, frame: Frame, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where the pages' blocks run: our frames, at 1 and 4 samples, and one of Blender's."""
+    monkeypatch.chdir(tmp_path)
     first = tmp_path / "room.exr"
     write_frame(first, frame)
     exr.write_channels(tmp_path / "render.exr", passes(frame))
@@ -48,7 +50,7 @@ def folder(tmp_path: Path, frame: Frame, monkeypatch: pytest.MonkeyPatch) -> Pat
     for name in ("a.exr", "b.exr", "frames/a.exr", "frames/b.exr", "more/c.exr", "shot/room.exr"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(first, tmp_path / name)
-    monkeypatch.chdir(tmp_path)
+    save_parameters("params.json", DEFAULT, guides=["normal", "depth", "ao"])  # as `jflnr fit`
     return tmp_path
 
 
