@@ -22,7 +22,7 @@ from jflnr.layouts.source import recognise
 # Rows that are decoded at a time; every compression packs a divisor of it together.
 BATCH = 64
 # What `layouts.assemble` makes a frame's layers of, whichever are asked for.
-NEEDED = ("indirect", "radiance", "beauty", "albedo", "normal", "depth")
+NEEDED = ("indirect", "radiance", "beauty", "emission", "albedo", "normal", "depth", "position")
 
 
 def _openimageio() -> Any:

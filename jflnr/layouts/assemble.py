@@ -40,7 +40,7 @@ def assemble(source: Source) -> Layers:
     if camera is not None:
         images |= _derived(images, camera, source.attributes.window)
     if layout.light != "indirect" or "beauty" in layout.channels:
-        images |= _separated(images)
+        images |= _separated(images, source.part)
     if layout.motion_up and images["motion"] is not None:
         images["motion"] = images["motion"] * np.array([1, -1], np.float32)
     return {name: images[name] for name in LAYERS}
@@ -56,7 +56,7 @@ def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
     return {}
 
 
-def _separated(images: Layers) -> Layers:
+def _separated(images: Layers, part: bool) -> Layers:
     """The layers of another program's picture: what is denoised, and the rest of the picture.
 
     `albedo * (direct + indirect) + emission` is the beauty again. Where there is no surface or all
@@ -64,6 +64,10 @@ def _separated(images: Layers) -> Layers:
     """
     depth, albedo, beauty = images["depth"], images["albedo"], images.get("beauty")
     assert depth is not None and albedo is not None
+    if part and (depth < 0).any():
+        raise ValueError(
+            "depth is negative in places, which only the whole file can explain: raise --memory"
+        )
     depth = np.where((depth > 0) & (depth < SKY), depth, 0)
     mask, indirect, emission = images["mask"], images["indirect"], images["emission"]
     if mask is None:
