@@ -18,12 +18,14 @@ const loaded = new Map();
 
 async function showScene(index) {
   $("scene").value = index;
+  $("unpacking").hidden = loaded.has(index);
   if (!loaded.has(index)) loaded.set(index, await loadScene(CONTENT.scenes[index]));
   const scene = (state.scene = loaded.get(index));
   // The same names as before, so that flipping between scenes compares like with like.
   const named = (image) => scene.images.find((other) => other.name === image?.name);
   state.left = named(state.left) ?? scene.images[Math.min(1, scene.images.length - 1)];
   state.right = named(state.right) ?? scene.images.at(-1);
+  $("unpacking").hidden = true;
   $("viewer").hidden = false;
   buildPanel();
   buildCrops();
