@@ -1,0 +1,98 @@
+"""FLNR beside everything else that can be run here, on the test frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from experiments import data, plots, results, resume
+from experiments.methods import Method, basic, oidn_peers, ours
+from experiments.table1 import mean_of, per_frame
+from experiments.timing import times
+from jflnr import denoise
+from jflnr.frame import Frame
+from jflnr.metrics import display, exposure, measure
+
+NAME = "flnr"
+QUESTION = "What does the network add, frame by frame, and what does it cost?"
+
+COLUMNS = {
+    "method": "method",
+    "psnr": "PSNR, dB",
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "rmse": "rMSE",
+    "smape": "SMAPE",
+    "energy": "energy",
+    "ms": "ms, 640 x 360",
+}
+SHOWN = ("noisy", "OIDN, tuned", "flr-adaptive", "flnr", "reference")
+CROP = 160
+
+
+def methods() -> list[Method]:
+    """Noisy, FLR with and without ambient occlusion, ours, OIDN."""
+    without = {"guides": ("normal", "depth")}
+    mine = [method for method in ours() if method.on_device]
+    noisy = [method for method in basic() if method.name == "noisy"]
+    return [*noisy, Method("flr, no ao", "jflnr", denoise, without), *mine, *oidn_peers()]
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Metrics of each method on each test frame, their means, and times."""
+    all_methods = methods()
+    paths = [data.SHIPPED] if quick else data.frames("test")
+
+    def on_frame(path: str) -> list[dict[str, Any]]:
+        frame, label = data.read(Path(path)), data.label(Path(path))
+        return [{"method": m.name, "frame": label} | _measured(frame, m) for m in all_methods]
+
+    found = resume.rows(f"{NAME}{'-quick' * quick}", [str(path) for path in paths], on_frame)
+    frames = [row for rows in found for row in rows]
+    clock = times([m for m in all_methods if m.name != "noisy"], data.read(paths[0]), quick)
+    means = [mean_of(frames, m.name) for m in all_methods]
+    for row in means:
+        mine = [other["energy"] for other in frames if other["method"] == row["method"]]
+        row["energy"] = f"{min(mine):.3f} to {max(mine):.3f}"
+        if row["method"] in clock:
+            row["ms"] = clock[row["method"]]
+    return {"means": means, "frames": frames}
+
+
+def _measured(frame: Frame, method: Method) -> dict[str, Any]:
+    """Metrics, and the radiance of the result relative to the input's."""
+    light, albedo = method(frame), np.asarray(frame.albedo, np.float64)
+    energy = np.sum(albedo * light) / np.sum(albedo * np.asarray(frame.indirect))
+    return measure(frame, light) | {"energy": float(energy)}
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """flnr_table.md, and crops of the frames that gain most and least over adaptive FLR."""
+    text = results.table(result["means"], COLUMNS) + "\n" + per_frame(result["frames"])
+    plots.write_text(folder / "flnr_table.md", text)
+    psnr = {(row["method"], row["frame"]): row["psnr"] for row in result["frames"]}
+    labels = {row["frame"] for row in result["frames"]}
+    by_gain = sorted(labels, key=lambda f: psnr["flnr", f] - psnr["flr-adaptive", f])
+    paths = {data.label(p): p for p in [data.SHIPPED, *data.frames("test")]}
+    for label, name in ((by_gain[-1], "best"), (by_gain[0], "worst")):
+        picture = _crops(data.read(paths[label]))
+        Image.fromarray(picture).save(folder / f"flnr_{name}.png")
+
+
+def _crops(frame: Frame) -> np.ndarray:
+    """Side by side, the part of the frame where `flnr` and `flr-adaptive` differ most."""
+    albedo = np.asarray(frame.albedo, np.float64)
+    lights = {m.name: m(frame) for m in methods() if m.name in SHOWN}
+    lights["reference"] = np.asarray(frame.reference)
+    scale = exposure(albedo * lights["reference"])
+    shown = {name: display(albedo * light, scale) for name, light in lights.items()}
+    change = np.sum((shown["flnr"] - shown["flr-adaptive"]) ** 2, axis=-1)
+    rows, columns = (size // CROP for size in change.shape)
+    blocks = change[: rows * CROP, : columns * CROP].reshape(rows, CROP, columns, CROP)
+    y, x = np.unravel_index(np.argmax(blocks.sum((1, 3))), (rows, columns))
+    part = np.s_[y * CROP : (y + 1) * CROP, x * CROP : (x + 1) * CROP]
+    panels = [shown[name][part] for name in SHOWN if name in shown]
+    return np.uint8(255 * np.concatenate(panels, axis=1) + 0.5)

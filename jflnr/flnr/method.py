@@ -1,0 +1,55 @@
+"""The methods flnr-tiny, flnr-small and flnr of `jflnr.denoise`."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import jax
+
+from jflnr.flnr import features, regression, unet, weights
+from jflnr.flr.adaptive import light_of
+from jflnr.flr.energy import rescale
+from jflnr.frame import Array, Frame
+
+METHODS = ("flnr-tiny", "flnr-small", "flnr")
+
+
+def denoise_flnr(
+    frame: Frame,
+    method: str,
+    params: unet.Params | None = None,
+    *,
+    names: Sequence[str] = features.GUIDES,
+    keep_energy: bool = False,
+) -> Array:
+    """Denoise with the network of a method, or with weights of one's own.
+
+    frame: as from `read_frame`, with `ao`. params: as from `weights.load`; those that come with the
+    package if None. names: the guides asked for. keep_energy: keep the mean radiance exactly.
+    Returns `(H, W, 3)`.
+
+    Raises `ValueError` for another set of guides than the network was trained with, and for light
+    of other than three channels or of another size than the guides.
+    """
+    if sorted(names) != sorted(features.GUIDES):
+        raise ValueError(
+            f"method {method} was trained with the guides {', '.join(features.GUIDES)} and works "
+            f"with no others; got {', '.join(names) or 'none'}. flr and flr-adaptive take any"
+        )
+    if frame.indirect.shape != frame.normal.shape:
+        raise ValueError(
+            f"method {method} needs frame.indirect of three channels and as large as the guides; "
+            f"got {frame.indirect.shape} and {frame.normal.shape}"
+        )
+    return _denoise(frame, weights.shipped(method) if params is None else params, keep_energy)
+
+
+@functools.partial(jax.jit, static_argnames="keep_energy")
+def _denoise(frame: Frame, params: unet.Params, keep_energy: bool) -> jax.Array:
+    from jflnr.denoising import adaptive_images
+
+    images = adaptive_images(frame, features.GUIDES)
+    target, guides, weight = images["target"], images["guides"], images["weight"]
+    image = regression.flnr(target, guides, params, weight=weight)
+    return rescale(image, light_of(target), weight) if keep_energy else image

@@ -1,0 +1,148 @@
+"""Training: its optimiser, its examples, going on after an interruption, several devices."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jflnr.flnr import examples as reading
+from jflnr.flnr import loss, regression, train
+from jflnr.flnr.adam import Adam
+from jflnr.flnr.augment import augment
+from tests.flnr.conftest import WIDTHS, as_jax
+
+
+def test_adam_is_the_papers_algorithm():
+    """Algorithm 1 of Kingma and Ba in numpy, on a quadratic."""
+    curvature = np.array([1.0, 10.0, 0.1])
+    solver = Adam(lambda p, data: jnp.sum(data * p**2) / 2, lambda t: 0.1, clip=1e9)
+    params = jnp.ones(3)
+    state = solver.init_state(params)
+    p, m, v = np.ones(3), 0, 0
+    for t in range(1, 6):
+        params, state = solver.update(params, state, data=jnp.asarray(curvature))
+        g = curvature * p
+        m, v = 0.9 * m + 0.1 * g, 0.99 * v + 0.01 * g**2
+        p = p - 0.1 * (m / (1 - 0.9**t)) / (np.sqrt(v / (1 - 0.99**t)) + 1e-8)
+    np.testing.assert_allclose(params, p, rtol=1e-5)
+
+
+def test_adam_runs_over_an_iterator_as_jaxopts_solvers_do():
+    solver = Adam(lambda p, data: jnp.mean((p - data) ** 2), lambda t: 0.1, maxiter=200)
+    batches = iter(np.random.default_rng(0).normal(3, 0.1, (300, 8)).astype(np.float32))
+    params, state = solver.run_iterator(jnp.zeros(()), batches)
+    assert abs(float(params) - 3) < 0.1
+    assert abs(float(state.average) - 3) < 0.5
+
+
+def test_a_step_whose_gradient_overflows_is_left_out():
+    solver = Adam(lambda p, data: data * p, lambda t: 0.1)
+    params = jnp.ones(())
+    state = solver.init_state(params)
+    moved, state = solver.update(params, state, data=jnp.asarray(jnp.inf))
+    assert float(moved) == 1
+
+
+def test_augmenting_shows_the_same_scene(examples):
+    """Mirrored, recoloured or turned, the untrained denoiser errs as much."""
+    start = regression.init(jax.random.key(0), WIDTHS)
+    example = as_jax(examples[0])
+    plain = float(loss.to_reference(start, example))
+    other = jax.jit(lambda key: augment(key, example))
+    many = [other(jax.random.key(seed)) for seed in range(4)]
+    for changed in many:
+        assert abs(float(loss.to_reference(start, changed)) - plain) < 0.05
+    assert any(np.abs(changed.target - example.target).max() > 0.1 for changed in many)
+
+
+def test_augmented_inputs_are_those_of_the_mirrored_frame(scene, examples):
+    """What the network reads of a mirrored example is the example's of the mirrored frame."""
+    mirror = jnp.asarray(True)
+    from jflnr.flnr.augment import _mirror
+
+    def known(flip):
+        target, guides = (a[:32, :48] for a in scene)
+        return regression.prepare(flip(target), flip(guides), None)[0]
+
+    flip = lambda a: np.ascontiguousarray(a[:, ::-1])
+    example = as_jax(examples[0])._replace(prepared=known(lambda a: a))
+    ours, wanted = _mirror(example, 1, mirror).prepared, known(flip)
+    for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(wanted), strict=True):
+        np.testing.assert_allclose(mine, other, rtol=0.02, atol=0.02 * np.abs(other).max())
+
+
+def test_going_on_gives_the_same_weights(examples, settings, tmp_path):
+    whole = train.train(examples, [], settings, stop=lambda step: step >= 4)
+    state = tmp_path / "state"
+    train.train(examples, [], settings, state_file=state, stop=lambda step: step >= 2)
+    rest = train.train(examples, [], settings, state_file=state, stop=lambda step: step >= 4)
+    for name, value in whole.params.items():
+        np.testing.assert_array_equal(rest.params[name], value)
+    assert [entry.step for entry in rest.history] == [0, 2, 4]
+    other = dataclasses.replace(settings, seed=1)
+    with pytest.raises(ValueError, match="another run"):
+        train.train(examples, [], other, state_file=state, stop=lambda step: True)
+
+
+def test_a_state_that_is_none_is_refused(examples, settings, tmp_path):
+    (tmp_path / "state").write_bytes(b"no state")
+    with pytest.raises(ValueError, match="not the state of a training run"):
+        train.train(examples, [], settings, state_file=tmp_path / "state", stop=lambda step: True)
+
+
+def test_noise_as_target_has_its_least_loss_at_the_mean(rng):
+    """The derivative of the loss with noisy targets vanishes, on average, at the true light."""
+    noise = jnp.asarray(rng.exponential(2.0, 200_000))
+    slope = jax.grad(lambda x: loss.relative(x * jnp.ones_like(noise), noise))
+    assert abs(float(slope(2.0))) < 0.02
+    assert float(slope(1.5)) < -0.1 and float(slope(2.5)) > 0.1
+
+
+def test_frames_that_cannot_be_trained_on(frames):
+    from jflnr.frame import read_frame, write_frame
+
+    path = frames / "scene1.exr"
+    frame = read_frame(path)
+    for change, sentence in (
+        ({"reference": None}, "reference or two"),
+        ({"ao": None}, "layer ao"),
+    ):
+        write_frame(path, dataclasses.replace(frame, **change))
+        with pytest.raises(ValueError, match=sentence):
+            list(reading.read([path], 0))
+
+
+TWO_DEVICES = """
+import sys
+import jax
+import numpy as np
+sys.path.insert(0, {root!r})
+from pathlib import Path
+from jflnr.flnr import examples, train
+examples.HEIGHT, examples.WIDTH = 32, 64
+found = [e for some in examples.read(sorted(Path({folder!r}).glob("*.exr")), 0) for e in some]
+settings = train.Settings(widths=(4, 4, 4), batch=2, every=1)
+result = train.train(found, [], settings, stop=lambda step: step >= 1)
+print(len(jax.local_devices()), result.history[-1].loss)
+"""
+
+
+def test_two_devices_find_the_same_loss(frames, examples, settings):
+    one = train.train(examples, [], settings, stop=lambda step: step >= 1)
+    code = TWO_DEVICES.format(root=os.getcwd(), folder=str(frames))
+    flags = {"XLA_FLAGS": "--xla_force_host_platform_device_count=2", "JAX_PLATFORMS": "cpu"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        env=os.environ | flags,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    devices, value = done.stdout.split()
+    assert devices == "2"
+    np.testing.assert_allclose(float(value), one.history[-1].loss, rtol=1e-4)
