@@ -1,0 +1,124 @@
+"""A frame in pieces: the result of the whole."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr.frame import Frame
+from jflnr.large import memory, strips
+from jflnr.large.pieces import pieces
+from jflnr.large.planes import Planes
+
+# One unit in the last place of the shift or the scale, which whole and pieces may round apart, is
+# magnified by the regression; a seam would be a thousand times larger.
+RELATIVE = 1e-5
+
+
+def room(rng: np.random.Generator, height: int, width: int) -> Frame:
+    """Walls with edges between them, a shadow, noise, and some sky."""
+    y, x = (grid[..., None].astype(np.float32) for grid in np.mgrid[:height, :width])
+    wall = (x // 37 + y // 23) % 3
+    normal = np.concatenate([wall == 0, wall == 1, wall == 2], axis=-1).astype(np.float32)
+    light = (1 + np.sin(x / 40) * np.cos(y / 31)) * (0.2 + wall) * [1, 0.8, 0.6]
+    sky = (x + y) % 97 < 4
+    return Frame(
+        indirect=(light * rng.exponential(size=light.shape)).astype(np.float32),
+        albedo=np.full((height, width, 3), 0.5, np.float32),
+        normal=normal,
+        depth=np.where(sky, 0, 3 + wall + x / width).astype(np.float32),
+        ao=(0.5 + 0.5 * np.cos(x / 11) * rng.uniform(0.8, 1, x.shape)).astype(np.float32),
+        mask=np.where(sky, 0, 1).astype(np.float32),
+    )
+
+
+def relative(ours, whole) -> float:
+    return float(np.linalg.norm(np.asarray(ours) - whole) / np.linalg.norm(whole))
+
+
+@pytest.mark.parametrize(
+    "size, step, reach, align", [(100, 16, 8, 4), (101, 7, 30, 8), (5, 9, 1, 2)]
+)
+def test_pieces_cover_the_line_once_and_reach_far_enough(size, step, reach, align):
+    found = pieces(size, step, reach, align)
+    assert [i for p in found for i in range(p.start, p.stop)] == list(range(size))
+    for p in found:
+        assert p.low <= max(p.start - reach, 0) and p.high >= min(p.stop + reach, size)
+        assert p.low % align == 0 and p.high <= size
+    assert len({p.high - p.low for p in found}) <= 2
+
+
+def test_planes_are_what_was_written(rng, tmp_path):
+    image = rng.random((3, 7, 11), np.float32)
+    with Planes(tmp_path, 3, 7, 11) as planes:
+        planes[0:4, :] = image[:, :4]
+        planes[4:7, 2:11] = image[:, 4:, 2:]
+        np.testing.assert_array_equal(planes[1:6, 3:9], image[:, 1:6, 3:9])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("height, width, tile", [(203, 61, 40), (97, 130, 64)])
+def test_flr_in_strips_is_flr(rng, height, width, tile):
+    frame = room(rng, height, width)
+    whole = np.asarray(jflnr.denoise(frame))
+    assert relative(jflnr.denoise(frame, tile=tile), whole) < RELATIVE
+
+
+def test_options_of_flr_hold_in_strips(rng):
+    """Its position is taken about one point, smaller light has its own rows, windows reach far."""
+    fine = room(rng, 90, 66)
+    coarse = room(rng, 45, 33).indirect
+    position = np.concatenate([fine.depth, fine.ao, fine.depth], axis=-1) + 100
+    frame = dataclasses.replace(fine, indirect=coarse, position=position)
+    options = {"guides": ("normal", "position"), "parameters": jflnr.Parameters.of(9, 1e-4, 1e-3)}
+    whole = np.asarray(jflnr.denoise(frame, block=4, **options))
+    assert relative(jflnr.denoise(frame, block=4, tile=30, **options), whole) < RELATIVE
+
+
+def test_adaptive_flr_in_tiles_is_adaptive_flr(rng):
+    """Wide enough for five tiles whose windows end before the next but one."""
+    frame = room(rng, 70, 3603)
+    whole = np.asarray(jflnr.denoise(frame, "flr-adaptive"))
+    ours = np.asarray(jflnr.denoise(frame, "flr-adaptive", tile=600))
+    assert relative(ours, whole) < RELATIVE
+    # No seam: where strips and tiles meet, nothing differs more than elsewhere.
+    assert np.abs(ours - whole).max() < 1e-3 * whole.mean()
+
+
+def test_a_nan_in_one_strip_stays_there(rng):
+    frame = room(rng, 203, 61)
+    light = np.array(frame.indirect)
+    light[100, 30] = np.nan
+    spoilt = jflnr.denoise(dataclasses.replace(frame, indirect=light), tile=40)
+    assert np.isfinite(spoilt).all()
+
+
+def test_a_wrong_tile_is_named(frame):
+    with pytest.raises(ValueError, match="tile must be at least 1"):
+        jflnr.denoise(frame, tile=0)
+    rows = strips.rows_of(frame)
+    with pytest.raises(ValueError, match="needs the whole frame"):
+        strips.denoise(rows, strips.Options("another", None, (), 8), 32)
+
+
+@pytest.mark.parametrize("text, size", [("4G", 4 << 30), ("1.5GiB", 3 << 29), ("800m", 800 << 20)])
+def test_sizes_are_read(text, size):
+    assert memory.parse(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "0G", "-1G", "4X", "lots"])
+def test_what_is_no_size_is_named(text):
+    with pytest.raises(ValueError, match="--memory must be a size such as 4G"):
+        memory.parse(text)
+
+
+@pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
+def test_larger_frames_come_in_smaller_pieces(method):
+    gigabyte = 1 << 30
+    assert memory.tile_for(1080, 1920, 4 * gigabyte, method=method) is None
+    large = memory.tile_for(8192, 16384, 4 * gigabyte, method=method)
+    larger = memory.tile_for(16384, 32768, 4 * gigabyte, method=method)
+    assert large > larger > 0
+    with pytest.raises(ValueError, match="too little for 16384 x 8192 pixels"):
+        memory.tile_for(8192, 16384, gigabyte // 2, method=method)
