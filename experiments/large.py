@@ -14,15 +14,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from distributed import LocalCluster
-
 from experiments import mosaic, plots, results
 from jflnr.cli import parser
 from jflnr.cli.frames import Denoiser, failure
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
-from jflnr.cluster import each
+from jflnr.cluster import each, local_cluster
 
 NAME = "large"
 QUESTION = "What do large frames, many frames and several workers take, in memory and in time?"
@@ -137,7 +135,7 @@ def _workers(shot: Path) -> list[dict[str, Any]]:
         one()
         rows.append({"workers": 0, "rate": _rate(jobs, one)})
         for count in WORKERS:
-            with _local(count) as local:
+            with local_cluster(count) as local:
                 every = lambda to=local.scheduler_address: list(each(to, alone, jobs, failure))
                 every()
                 rows.append({"workers": count, "rate": _rate(jobs, every)})
@@ -151,7 +149,7 @@ def _killed(shot: Path) -> dict[str, Any]:
         for job in plan([shot], Path(one)):
             denoiser(job)
         jobs, records = plan([shot], Path(two)), []
-        with _local(2) as local:
+        with local_cluster(2) as local:
             for record in each(local.scheduler_address, denoiser, jobs, failure):
                 records.append(record)
                 if len(records) == len(jobs) // 2:
@@ -167,12 +165,6 @@ def _killed(shot: Path) -> dict[str, Any]:
             "files": len(os.listdir(two)),
             "identical": sum(same),
         }
-
-
-def _local(count: int) -> Any:
-    return LocalCluster(
-        n_workers=count, threads_per_worker=1, dashboard_address=None, memory_limit=0
-    )
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from typing import Any
 
 # How often a job is given to another worker after the one that had it died.
@@ -73,15 +74,22 @@ def cores() -> int:
 @contextmanager
 def _cluster(address: str) -> Iterator[str]:
     """The address of a scheduler: the one given, or of workers on this machine's cores."""
-    distributed = _distributed()
     if address:
         yield address
         return
-    with ExitStack() as stack:
-        local = distributed.LocalCluster(
-            n_workers=cores(), threads_per_worker=1, dashboard_address=None, memory_limit=0
-        )
-        yield stack.enter_context(local).scheduler_address
+    with local_cluster(cores()) as local:
+        yield local.scheduler_address
+
+
+def local_cluster(count: int) -> Any:
+    """Dask workers on this machine, processes of one thread each; a context manager."""
+    return _distributed().LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        dashboard_address=":0",
+        memory_limit=0,
+        silence_logs=logging.ERROR,
+    )
 
 
 @contextmanager

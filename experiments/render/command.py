@@ -87,6 +87,13 @@ def _data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
     parser.add_argument("--frames", type=int, default=400)
     parser.add_argument("--split", choices=("train", "val", "test"), default="train")
+    parser.add_argument(
+        "--cluster",
+        nargs="?",
+        const="",
+        metavar="ADDRESS",
+        help="on a Dask cluster, tcp://HOST:8786; without ADDRESS on this machine's cores",
+    )
 
 
 def _statistics(parser: argparse.ArgumentParser) -> None:

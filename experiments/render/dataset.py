@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,9 +13,10 @@ from experiments.render import frame
 from experiments.render.manifest import Manifest
 from experiments.render.reference import Goal
 from experiments.render.sampling import stream_seed
-from experiments.render.source import RANDOM, Source, load
+from experiments.render.source import RANDOM, load
 from experiments.render.splits import TEST, TRAIN_ROOMS, VAL, check_split
 from experiments.scenes.catalogue import FAMILIES
+from jflnr import read_header
 
 NOISY = {
     "train": (1, 2, 4, 8, 16),
@@ -104,7 +106,6 @@ def fill(
     Raises ValueError where a job's scene does not belong to the split it is to be written to.
     """
     manifest = Manifest(folder)
-    source: Source | None = None
     start, made, there = time.monotonic(), 0, 0
     for job in jobs:
         there = manifest.count(job.split)
@@ -113,11 +114,12 @@ def fill(
         check_split(job.scene, job.split)
         if manifest.done(job.name):
             continue
-        if source is None or source.name != job.scene:
-            source = load(job.scene)
-        if not _render(folder, manifest, job, source):
+        found = render_job(folder, job)
+        if isinstance(found, str):
+            manifest.skip(job.name, found)
             say(f"{job.name}: no valid view")
             continue
+        manifest.add(job.name, found)
         there, made = there + 1, made + 1
         left = (frames - there) * (time.monotonic() - start) / made / 60
         error = manifest.entries[job.name]["reference_median_relative_standard_error"]
@@ -125,23 +127,26 @@ def fill(
     return there
 
 
-def _render(folder: Path, manifest: Manifest, job: Job, source: Source) -> bool:
-    """Render one job; False where the scene has no such view."""
+_load = functools.lru_cache(maxsize=1)(load)
+
+
+def render_job(folder: Path, job: Job) -> dict[str, Any] | str:
+    """Render one job, unless its file is there; its facts, or why there is no such frame."""
+    if (folder / job.name).exists():
+        return _without_matrix(read_header(folder / job.name))
+    source = _load(job.scene)
     if job.view < RANDOM and job.view not in source.own:
-        manifest.skip(job.name, "the scene has no view of this number")
-        return False
+        return "the scene has no view of this number"
     found = source.view(job.view)
     if found is None:
-        manifest.skip(job.name, "no valid view was found")
-        return False
+        return "no valid view was found"
     camera, near = found
     state = folder / "state" / (job.name.replace("/", "_") + ".npz")
     layers, facts = frame.render(source.scene, camera, settings_of(job), near, state)
     facts = {"scene": job.scene, "view": job.view, "split": job.split} | facts
     frame.write(folder / job.name, layers, facts)
     state.unlink(missing_ok=True)
-    manifest.add(job.name, _without_matrix(facts))
-    return True
+    return _without_matrix(facts)
 
 
 def _without_matrix(facts: dict[str, Any]) -> dict[str, Any]:

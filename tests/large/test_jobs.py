@@ -63,14 +63,12 @@ def write_slowly(job):
 
 
 def test_a_killed_worker_loses_nothing_and_a_failure_is_told(tmp_path):
-    distributed = pytest.importorskip("distributed")
-    from jflnr.cluster import each
+    pytest.importorskip("distributed")
+    from jflnr.cluster import each, local_cluster
 
     jobs = [(number, tmp_path) for number in range(8)]
     found = []
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, memory_limit=0
-    ) as local:
+    with local_cluster(2) as local:
         for result in each(
             local.scheduler_address, write_slowly, jobs, lambda job, error: (job[0], str(error))
         ):

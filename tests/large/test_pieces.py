@@ -78,7 +78,7 @@ def test_options_of_flr_hold_in_strips(rng):
 
 def test_adaptive_flr_in_tiles_is_adaptive_flr(rng):
     """Wide enough for five tiles whose windows end before the next but one."""
-    frame = room(rng, 70, 3603)
+    frame = room(rng, 70, 3584)
     whole = np.asarray(jflnr.denoise(frame, "flr-adaptive"))
     ours = np.asarray(jflnr.denoise(frame, "flr-adaptive", tile=600))
     assert relative(ours, whole) < RELATIVE
