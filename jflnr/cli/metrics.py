@@ -47,19 +47,10 @@ def measure_files(a: Path, b: Path, spp: int) -> dict[str, float | None]:
     channels_a, channels_b = exr.read_channels(a), exr.read_channels(b)
     if "reference" in exr.layers_of(channels_b):
         return metrics.measure(read_frame(b, spp), _light(channels_a, spp, a))
-    return metrics.compare(_plain(channels_a, a), _plain(channels_b, b))
+    picture = layouts.picture(channels_a, str(a))
+    return metrics.compare(picture, layouts.picture(channels_b, str(b)))
 
 
 def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:
     layer = "indirect" if "indirect.R" in channels else f"indirect_{spp}"
     return layouts.layer(channels, "indirect", tuple(f"{layer}.{c}" for c in "RGB"), str(path))
-
-
-def _plain(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
-    picture = tuple("RGB") if "R" in channels else layouts.recognise(channels).picture[:3]
-    if missing := [c for c in picture or "RGB" if c not in channels]:
-        raise ValueError(
-            f"{path}: nothing to compare: B holds no layer reference, and the plain channel "
-            f"{missing[0]} is missing here"
-        )
-    return np.stack([channels[c].astype(np.float32) for c in picture], axis=-1)

@@ -8,7 +8,7 @@ from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
 from jflnr.layouts.channels import LAYERS, Layout, layer
 from jflnr.layouts.output import CHOICES, output_channels
-from jflnr.layouts.source import Source, load, parse_header, recognise
+from jflnr.layouts.source import Source, load, parse_header, picture
 
 __all__ = [
     "CHOICES",
@@ -21,5 +21,5 @@ __all__ = [
     "native",
     "output_channels",
     "parse_header",
-    "recognise",
+    "picture",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from jflnr import checks, exr
 from jflnr.layouts import blender, common, mitsuba, native, pbrt
-from jflnr.layouts.channels import Layout
+from jflnr.layouts.channels import Layout, layer, present
 from jflnr.layouts.override import override
 
 
@@ -57,6 +57,16 @@ def recognise(channels: Mapping[str, np.ndarray], spp: int | None = None) -> Lay
             if (found := program.layout(channels)) is not None:
                 return found
     return native.layout(spp or (counts or [1])[0], channels)
+
+
+def picture(channels: Mapping[str, np.ndarray], source: str) -> np.ndarray:
+    """The whole picture, (H, W, 3) float32: plain R, G, B or what the program calls it.
+
+    Raises ValueError, naming `source`, if there is none.
+    """
+    names = tuple("RGB") if "R" in channels else recognise(channels).picture[:3]
+    advice = f"there is no picture in it; {present(channels)}"
+    return layer(channels, "beauty", names or tuple("RGB"), source, advice)
 
 
 def parse_header(comments: str) -> dict:

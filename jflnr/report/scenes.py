@@ -97,12 +97,9 @@ def _is_picture(channels: dict[str, np.ndarray]) -> bool:
 
 def _plain(paths: Sequence[Path], channels: dict, reference: Path | None) -> Scene:
     names = _names(paths)
-    images = {
-        name: layouts.layer(channels[p], "", tuple("RGB"), str(p)) for p, name in names.items()
-    }
+    images = {name: layouts.picture(channels[p], str(p)) for p, name in names.items()}
     if reference is not None:
-        found = exr.read_channels(reference)
-        images[REFERENCE] = layouts.layer(found, "", tuple("RGB"), str(reference))
+        images[REFERENCE] = layouts.picture(exr.read_channels(reference), str(reference))
     return Scene(paths[0].stem if len(paths) == 1 else "pictures", images)
 
 

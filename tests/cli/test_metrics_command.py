@@ -61,7 +61,7 @@ def test_errors(tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[
     small = write(tmp_path / "small.exr", "indirect.", np.ones((3, 4, 3), np.float32))
     for argv, message in [
         ((small, frame_file), "indirect is 4 x 3, reference is 40 x 24"),
-        ((small, small), "nothing to compare"),
+        ((small, small), "there is no picture in it; the file holds indirect"),
         ((frame_file, frame_file, "--spp", "4"), "there is indirect light for spp 1"),
         ((tmp_path / "gone.exr", frame_file), "there is no such file"),
     ]:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from jflnr import exr, layouts
 from jflnr.cli import main
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
+from jflnr.layouts.source import recognise
 
 USUAL = [
     ("Beauty.{RGB}", "VisibleDiffuse.{RGB}", "OptixNormals.{RGB}", "Z"),
@@ -188,7 +189,7 @@ def test_any_names_give_a_frame_or_one_sentence(
     noise = np.random.default_rng(0).uniform(0.1, 1, (len(names), 4, 5)).astype(np.float32)
     channels = dict(zip(names, noise, strict=True))
     attributes = exr.Attributes("", "ZIP", 1, exr.Window(), {}, (4, 5))
-    source = layouts.Source(Path("a.exr"), channels, attributes, layouts.recognise(channels))
+    source = layouts.Source(Path("a.exr"), channels, attributes, recognise(channels))
     try:
         images = layouts.assemble(source)
     except ValueError as error:
