@@ -37,7 +37,7 @@ def voices() -> Iterator[tuple[TextIO, TextIO]]:
     if sys.stderr is not sys.__stderr__:
         yield sys.stdout, sys.stderr
         return
-    with os.fdopen(os.dup(sys.stderr.fileno()), "w", buffering=1) as err:
+    with open(os.dup(2), "w", buffering=1) as err:
         yield sys.stdout, err
 
 

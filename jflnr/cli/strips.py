@@ -86,4 +86,5 @@ def _channels(
     part = file.part(top, top + light.shape[0], PICTURE)
     frame, lights = frame_of(part), split(light)
     picture = picture_of(frame, lights)
-    return layouts.output_channels(part, picture, lights, frame.mask, arguments.channels)
+    mask = None if frame.mask is None else np.asarray(frame.mask)
+    return layouts.output_channels(part, picture, lights, mask, arguments.channels)

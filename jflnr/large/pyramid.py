@@ -62,11 +62,11 @@ class Job:
 
     def tiles(self, side: int, reach: int, align: int) -> list[tuple[Piece, Piece]]:
         """Rows and columns of tiles, in blocks of `side` pixels."""
-        lines = [
+        rows, columns = (
             pieces(-(-size // side), max(self.tile // side, 1), reach, align)
             for size in (self.rows.height, self.rows.width)
-        ]
-        return list(itertools.product(*lines))
+        )
+        return list(itertools.product(rows, columns))
 
 
 def strips(
@@ -98,8 +98,9 @@ def strips(
         count, wanted = _collect_light(job, light)
         mean = jnp.float32(wanted / count if wanted > 0 else 1)
         _collect_moments(job, _pilot(job, light, mean), mean, moments)
-        output, *sums = _fit(job, light, moments, models, mean)
-        rate = energy.rate(*map(jnp.float32, (wanted, *sums)), common.numbers.slack)
+        output, before, squares = _fit(job, light, moments, models, mean)
+        sums = [jnp.float32(total) for total in (wanted, before, squares)]
+        rate = energy.rate(sums[0], sums[1], sums[2], common.numbers.slack)
         share = 1.0
         if keep_energy:
             share = _kept_share(rows, _apply(job, models, output, rate))
@@ -177,7 +178,8 @@ def _apply(job: Job, models: Planes, output: np.ndarray, rate: jax.Array) -> Ite
         blocks = piece.on(job.block)
         low, high = max(blocks.low - 2, 0), min(blocks.high + 2, models.height)
         part = models[low:high, :].reshape(-1, job.rows.channels, high - low, models.width)
-        part = energy.scale(part, output[low // 2 : -(-high // 2)], rate)
+        given = jnp.asarray(output[low // 2 : -(-high // 2)])
+        part = np.asarray(energy.scale(jnp.asarray(part), given, rate))
         # One more row of blocks on both sides, repeated at the frame's borders.
         part = np.pad(part, ((0, 0), (0, 0), (1, 1), (0, 0)), mode="edge")
         part = part[:, :, blocks.low - low :][:, :, : blocks.high - blocks.low + 2]
@@ -191,7 +193,8 @@ def _kept_share(rows: Rows, images: Iterator[Strip]) -> float:
     before = after = 0.0
     for start, image in images:
         frame = rows.read(start, start + image.shape[0])
-        light, given = (np.asarray(adaptive.light_of(a)) for a in (frame.indirect, image))
+        light = np.asarray(adaptive.light_of(jnp.asarray(frame.indirect)))
+        given = np.asarray(adaptive.light_of(jnp.asarray(image)))
         counts = np.isfinite(light)
         if frame.mask is not None:
             counts &= frame.mask[..., 0] > 0

@@ -34,7 +34,7 @@ class Rows:
 def rows_of(frame: Frame) -> Rows:
     """The rows of a frame that is in memory."""
     (height, width), light = frame.normal.shape[:2], frame.indirect.shape
-    factor = times_finer((height, width), light[:2]) or 1
+    factor = times_finer((height, width), (light[0], light[1])) or 1
 
     def read(start: int, stop: int) -> Frame:
         fine = {
