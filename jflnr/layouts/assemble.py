@@ -31,7 +31,8 @@ def assemble(source: Source) -> Layers:
         advice = layout.advice.get(name, "")
         return layer(channels, name, names[name], str(source.path), advice, source.part)
 
-    camera = Camera.of(source.attributes.others | source.header)
+    # Others write worldToCamera too, transposed or looking another way.
+    camera = Camera.of(source.attributes.others if layout.program == "pbrt" else source.header)
     needed = {layout.light, *GUIDES}
     if camera is not None and "position" in there and "depth" not in there:
         needed.remove("depth")
@@ -56,6 +57,7 @@ def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
     return {}
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def _separated(images: Layers, part: bool) -> Layers:
     """The layers of another program's picture: what is denoised, and the rest of the picture.
 

@@ -36,7 +36,7 @@ def find(channels: Mapping[str, np.ndarray]) -> dict[str, tuple[str, ...]]:
     layers = layers_of(channels)
     found = {}
     for layer, usual in (NAMES | {"beauty": BEAUTY}).items():
-        by_name = {layer.rpartition(".")[2].lower(): layer for layer in reversed(layers)}
+        by_name = {stem.rpartition(".")[2].lower(): stem for stem in reversed(layers)}
         stems = [by_name[name] for name in usual if name in by_name]
         candidates = [in_layer(channels, stem) for stem in stems]
         count = 1 if layer in ("depth", "ao") else 3

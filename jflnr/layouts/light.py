@@ -7,6 +7,7 @@ import numpy as np
 DARK = 0.01
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def demodulate(radiance: np.ndarray, albedo: np.ndarray) -> np.ndarray:
     """The light that `albedo` reflects as `radiance`, both (H, W, 3).
 
@@ -19,11 +20,11 @@ def demodulate(radiance: np.ndarray, albedo: np.ndarray) -> np.ndarray:
     return np.where(bright, light, mean)
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def rest(picture: np.ndarray, albedo: np.ndarray, light: np.ndarray) -> np.ndarray:
     """What `picture` holds besides `albedo * light`: glossy, transmitted, emitted light, sky.
 
     0 where that product is NaN or infinite: there the denoised light stands in for the picture.
     """
-    with np.errstate(invalid="ignore"):
-        reflected = np.where(albedo > 0, albedo * light, 0)
-        return np.where(np.isfinite(reflected), picture - reflected, 0)
+    reflected = np.where(albedo > 0, albedo * light, 0)
+    return np.where(np.isfinite(reflected), picture - reflected, 0)

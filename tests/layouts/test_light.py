@@ -30,6 +30,13 @@ def test_the_rest_makes_up_for_it_exactly(value: float) -> None:
     np.testing.assert_allclose(albedo * light + rest(picture, albedo, light), picture, rtol=1e-6)
 
 
+@pytest.mark.parametrize("albedo", [np.nan, np.inf, -1.0, 1e-38])
+def test_strange_albedo_warns_of_nothing(albedo: float) -> None:
+    picture = image((np.inf, 1, 3e38), (np.nan, -np.inf, 0))
+    light = demodulate(picture, np.full_like(picture, albedo))
+    assert rest(picture, np.full_like(picture, albedo), light).shape == picture.shape
+
+
 def test_pixels_that_are_not_finite() -> None:
     albedo = image((0.5, 0.5, 0.5), (0, 0, 0))
     picture = image((np.nan, np.inf, 1), (np.inf, 1, 2))
