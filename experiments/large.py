@@ -14,13 +14,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from experiments import mosaic, plots, results
+import jax
+import matplotlib.pyplot as plt
+import numpy as np
+
+import jflnr
+from experiments import data, mosaic, plots, results
 from jflnr.cli import parser
 from jflnr.cli.frames import Denoiser, failure
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cluster import each, local_cluster
+from jflnr.files import replacing
+from jflnr.metrics import display, exposure
 
 NAME = "large"
 QUESTION = "What do large frames, many frames and several workers take, in memory and in time?"
@@ -167,8 +174,38 @@ def _killed(shot: Path) -> dict[str, Any]:
         }
 
 
+def seams(path: Path) -> None:
+    """Whole, in pieces, and in strips that know nothing of each other; below, what differs."""
+    frame = jflnr.read_frame(data.SHIPPED)
+    whole = np.asarray(jflnr.denoise(frame))
+    rows = 48
+    apart = [
+        jflnr.denoise(jax.tree.map(lambda a, top=top: a[top : top + rows], frame))
+        for top in range(0, whole.shape[0], rows)
+    ]
+    tile = int((rows * whole.shape[1]) ** 0.5)
+    pictures = {
+        "whole": whole,
+        f"in pieces (tile={tile})": np.asarray(jflnr.denoise(frame, tile=tile)),
+        "strips apart: what a seam is": np.concatenate(apart),
+    }
+    scale = exposure(whole * frame.albedo)
+    drawing, axes = plt.subplots(2, 3, figsize=(12, 5), layout="constrained")
+    for (top, bottom), (name, light) in zip(axes.T, pictures.items(), strict=True):
+        top.imshow(display(light * frame.albedo, scale))
+        difference = np.abs(light - whole).mean(axis=-1) / whole.mean()
+        bottom.imshow(difference, vmin=0, vmax=0.02, cmap="gray")
+        top.set(title=name, xticks=[], yticks=[])
+        text = f"difference: at most {difference.max():.1g} of the mean (white: 0.02)"
+        bottom.set(xlabel=text, xticks=[], yticks=[])
+    with replacing(path) as beside:
+        drawing.savefig(beside, dpi=80, format="png")
+    plt.close(drawing)
+
+
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """large.png: memory and time by size, frames per second; large_figures.md."""
+    """large.png: memory and time by size, frames per second; large_seams.png; large_figures.md."""
+    seams(folder / f"{NAME}_seams.png")
     columns = {
         "method": "method",
         "way": "denoised",
