@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from experiments import results
@@ -38,6 +39,8 @@ def main(argv: list[str]) -> int:
     arguments = _parser().parse_args(argv)
     names = NAMES if getattr(arguments, "names", None) in (None, ["all"]) else arguments.names
     try:
+        if getattr(arguments, "cluster", None) is not None:
+            return _on_cluster(arguments, names)
         for name in names:
             if arguments.command == "list":
                 print(f"{name:16}{_module(name).QUESTION}")
@@ -56,6 +59,20 @@ def main(argv: list[str]) -> int:
     return 0
 
 
+def _on_cluster(arguments: argparse.Namespace, names: Sequence[str]) -> int:
+    """As `run`; an experiment that fails is reported, and the others are done."""
+    from experiments import farm
+
+    modules, code = {name: _module(name) for name in names}, 0
+    for name, error in farm.run(arguments.cluster, names, arguments.quick, arguments.out):
+        if error is None:
+            results.draw(modules[name], arguments.out, arguments.docs)
+            continue
+        print(f"experiments: {name}: {error}", file=sys.stderr)
+        code = 2
+    return code
+
+
 def _module(name: str) -> results.Experiment:
     if name not in NAMES:
         raise ValueError(f"{name!r} is none of the experiments: {', '.join(NAMES)}")
@@ -69,6 +86,13 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="run experiments by name, or all")
     run.add_argument("names", nargs="+", metavar="NAME")
     run.add_argument("--quick", action="store_true", help="a small version, in under a minute")
+    run.add_argument(
+        "--cluster",
+        nargs="?",
+        const="",
+        metavar="ADDRESS",
+        help="on a Dask cluster, tcp://HOST:8786; without ADDRESS on this machine's cores",
+    )
     report = commands.add_parser("report", help="charts, tables, OUT/report.html from results")
     for command in (run, report):
         command.add_argument("--out", type=Path, default=Path("out"), help="folder of results")

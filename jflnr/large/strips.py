@@ -60,8 +60,10 @@ def denoise(rows: Rows, options: Options, tile: int, folder: Path | None = None)
 
         height = max(tile * tile // rows.width, 1)
         return local.strips(rows, one, height=height, block=block, support=support)
-    if method != "flr-adaptive":
-        raise ValueError(f"method {method} needs the whole frame in memory")
+    if method != "flr-adaptive" or backend != "jax":
+        raise ValueError(
+            f"method {method} on {backend} needs the whole frame in memory: raise --memory"
+        )
     return pyramid.strips(
         rows, names, parameters, block=block, tile=tile, keep_energy=keep_energy, folder=folder
     )
