@@ -1,4 +1,4 @@
-"""Other frames from one: mirrored, with other colours, with the world turned."""
+"""Other frames from one: mirrored, with other colours."""
 
 from __future__ import annotations
 
@@ -14,17 +14,12 @@ PACKED = features.OF_GRID + features.OF_STEP + features.CHANNELS
 
 
 def augment(key: jax.Array, example: Example) -> Example:
-    """Mirror the crop, permute its channels and turn the normals that the network reads.
-
-    The fits stay as they are: what they predict does not depend on the axes of the world.
-    """
-    keys = jax.random.split(key, 4)
+    """Mirror the crop and permute its channels, at random."""
+    keys = jax.random.split(key, 3)
     known = example.prepared
     example = example._replace(prepared=known._replace(x=known.x.astype(known.mean.dtype)))
     example = _recolour(example, jax.random.permutation(keys[0], features.CHANNELS))
-    rotation, _ = jnp.linalg.qr(jax.random.normal(keys[1], (3, 3)))
-    example = _with_planes(example, lambda p: p.at[:3].set(jnp.tensordot(rotation, p[:3], 1)))
-    for axis, own in enumerate(keys[2:]):
+    for axis, own in enumerate(keys[1:]):
         example = _mirror(example, axis, jax.random.bernoulli(own))
     return example
 
@@ -48,7 +43,6 @@ def _recolour(example: Example, order: jax.Array) -> Example:
     known = known._replace(
         coarsest=known.coarsest[:, order],
         differences=tuple(difference[:, order] for difference in known.differences),
-        sums=known.sums.at[-features.CHANNELS :].set(known.sums[-features.CHANNELS :][order]),
     )
     albedo, target = example.albedo[..., order], example.target[..., order]
     return example._replace(prepared=known, albedo=albedo, target=target)

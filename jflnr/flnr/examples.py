@@ -25,6 +25,8 @@ from jflnr.metrics import MEAN_BRIGHTNESS
 HEIGHT, WIDTH = 160, 320
 # Noisy layers that are trained on, and how often for one of 1 spp.
 SHARES = {1: 1.0, 2: 0.35, 4: 0.35, 16: 0.35}
+# Further realisations of 1 spp per frame, drawn pixel by pixel from those that there are.
+MIXES = 6
 NOISY = re.compile(r"indirect_(\d+)(_[a-z])?\.R")
 # A crop that shows little but sky teaches little.
 LEAST_SURFACE = 0.2
@@ -57,14 +59,14 @@ def read(paths: Sequence[Path], seed: int) -> Iterator[list[Example]]:
     for path in paths:
         random = np.random.default_rng([seed, *path.name.encode()])
         found = []
-        for spp, frame in realisations(path):
+        for spp, frame in realisations(path, random):
             for crop in crops(frame, random):
                 if (example := _example(crop, SHARES[spp])) is not None:
                     found.append(example)
         yield found
 
 
-def realisations(path: Path) -> list[tuple[int, Frame]]:
+def realisations(path: Path, random: np.random.Generator) -> list[tuple[int, Frame]]:
     """The frame with each noisy layer that is trained on, and its samples per pixel."""
     channels = exr.read_channels(path)
     noisy = {m[0][:-2]: int(m[1]) for name in sorted(channels) if (m := NOISY.fullmatch(name))}
@@ -85,7 +87,21 @@ def realisations(path: Path) -> list[tuple[int, Frame]]:
         found.append((spp, dataclasses.replace(frame, indirect=light[name], reference=target)))
     if not found or frame.ao is None:
         raise ValueError(f"{path}: needs a layer ao, and reference or two of the same indirect_N")
+    ones = [own.indirect for spp, own in found if spp == 1]
+    if frame.reference is not None and len(ones) > 1:
+        mixes = (mixed(np.stack(ones), random) for _ in range(MIXES))
+        found += [(1, dataclasses.replace(frame, indirect=image)) for image in mixes]
     return found
+
+
+def mixed(images: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Each pixel from one of the images `(N, H, W, 3)`.
+
+    Pixels have random streams of their own, so this is as good a realisation as any of them, and
+    without such the network learns the few that there are by heart.
+    """
+    chosen = random.integers(len(images), size=(1, *images.shape[1:3], 1))
+    return np.take_along_axis(images, chosen, axis=0)[0]
 
 
 def crops(frame: Frame, random: np.random.Generator) -> Iterator[Frame]:

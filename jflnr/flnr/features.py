@@ -19,30 +19,32 @@ from jflnr.flr.pyramid import double, halve
 # The guides that the features are made of: normal (3), depth, ambient occlusion.
 GUIDES = ("normal", "depth", "ao")
 CHANNELS = 3
-# The guides and the logarithm of the light: what must be alike inside a window.
-REGRESSORS = 6
 # Light below this share of the frame's mean is as good as dark.
 DARK = 0.03
 BLURS = 4
-OF_GRID, OF_STEP = 11, 6
+OF_GRID, OF_STEP = 6, 6
 COUNT = 4 * (OF_GRID + OF_STEP + CHANNELS) + 2 * OF_STEP + BLURS + 2
 
 
-def of_steps(steps: list[Step], shift: jax.Array, mean: jax.Array) -> jax.Array:
+def of_steps(steps: list[Step], guides: int, mean: jax.Array) -> jax.Array:
     """All that is read, on blocks twice as large as the finest: `(h, w, COUNT)`.
 
     The finest blocks lie side by side as channels. steps: coarse to fine. mean: of the frame.
     """
     last = steps[-1]
-    colour = jnp.einsum("qchw,qhw->chw", last.merged, mean_guides(last.grid.moments, shift.size))
+    colour = jnp.einsum("qchw,qhw->chw", last.merged, mean_guides(last.grid.moments, guides))
     light = log_light(jnp.einsum("chw,c->hw", colour, brightness(CHANNELS, colour.dtype)), mean)
-    finest = [of_grid(last.grid, shift, mean), of_step(last, mean), log_light(colour, mean) - light]
+    finest = [
+        of_grid(last.grid, guides, mean),
+        of_step(last, mean),
+        log_light(colour, mean) - light,
+    ]
     packed = unet.pack(jnp.concatenate(finest))
     size = packed.shape[:2]
     coarser = [double(of_step(steps[0], mean), *size), of_step(steps[1], mean)]
     whole = jnp.stack([jnp.log(_mean_light(colour) / mean + 0.1), jnp.mean(light)])
     whole = jnp.broadcast_to(whole[:, None, None], (2, *size))
-    planes = jnp.concatenate([*coarser, blurred_light(last.grid, shift.size, mean), whole])
+    planes = jnp.concatenate([*coarser, blurred_light(last.grid, guides, mean), whole])
     return jnp.concatenate([packed, jnp.moveaxis(planes, 0, -1)], axis=-1)
 
 
@@ -51,20 +53,21 @@ def log_light(light: jax.Array, mean: jax.Array) -> jax.Array:
     return jnp.log(jnp.maximum(light, 0) / mean + DARK)
 
 
-def of_grid(grid: Grid, shift: jax.Array, mean: jax.Array) -> jax.Array:
-    """What blocks know before any fit: guides, their spread, light and noise. `(OF_GRID, h, w)`."""
+def of_grid(grid: Grid, guides: int, mean: jax.Array) -> jax.Array:
+    """What blocks know before any fit: how guides vary, light and its noise. `(OF_GRID, h, w)`.
+
+    The guides' own values are left out: with them the network learns the training scenes by heart.
+    """
     n = grid.moments[0]
     inverse = jnp.where(n > 1e-12, 1 / jnp.where(n > 1e-12, n, 1), 0)
-    centred = mean_guides(grid.moments, shift.size)[1:]
-    diagonal = np.array([index_xx(i + 1, i + 1) for i in range(shift.size)])
+    centred = mean_guides(grid.moments, guides)[1:]
+    diagonal = np.array([index_xx(i + 1, i + 1) for i in range(guides)])
     variance = jnp.maximum(grid.moments[diagonal] * inverse - centred**2, 0)
     spread = jnp.stack([jnp.sum(variance[:3], axis=0), variance[3], variance[4]])
-    x, y, z, depth, ao = centred + shift[:, None, None]
-    guides = jnp.stack([x, y, z, jnp.log(jnp.maximum(depth, 0) + 0.1), 2 * ao - 1])
-    light = _light(grid.moments, shift.size) * inverse
+    light = _light(grid.moments, guides) * inverse
     noise = jnp.sqrt(grid.noise[0] + 1e-12 * mean**2) * inverse
     own = [jnp.log(n + 0.01), log_light(light, mean), log_light(noise, mean)]
-    return jnp.concatenate([guides, 4 * jnp.sqrt(spread + 1e-4), jnp.stack(own)])
+    return jnp.concatenate([4 * jnp.sqrt(spread + 1e-4), jnp.stack(own)])
 
 
 def of_step(step: Step, mean: jax.Array) -> jax.Array:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 
 import jax
 
+from jflnr.denoising import adaptive_images
 from jflnr.flnr import features, regression, unet, weights
 from jflnr.flr.adaptive import light_of
 from jflnr.flr.energy import rescale
 from jflnr.frame import Array, Frame
-
-METHODS = ("flnr-tiny", "flnr-small", "flnr")
 
 
 def denoise_flnr(
@@ -47,8 +46,6 @@ def denoise_flnr(
 
 @functools.partial(jax.jit, static_argnames="keep_energy")
 def _denoise(frame: Frame, params: unet.Params, keep_energy: bool) -> jax.Array:
-    from jflnr.denoising import adaptive_images
-
     images = adaptive_images(frame, features.GUIDES)
     target, guides, weight = images["target"], images["guides"], images["weight"]
     image = regression.flnr(target, guides, params, weight=weight)

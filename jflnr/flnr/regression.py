@@ -14,21 +14,20 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from jflnr.flnr import features, residual, unet
+from jflnr.flnr import features, unet
 from jflnr.flr import adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.apply import apply, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import restoring_factor
-from jflnr.flr.moments import Guides, centre, index_xx, index_xy
+from jflnr.flr.moments import Guides, centre
 from jflnr.flr.pyramid import double
 
 # Side in pixels of the finest blocks.
 BLOCK = 4
-# The gain of a block lies within exp(-2) and exp(2).
-LARGEST_GAIN = 2.0
+# Logarithms of the largest gain of a block, and of the largest change of a share's odds.
+LARGEST_GAIN, LARGEST_CHANGE = 2.0, 3.0
 
 
 class Prepared(NamedTuple):
@@ -39,8 +38,8 @@ class Prepared(NamedTuple):
     x: `(ceil(h / 2), ceil(w / 2), features.COUNT)`, where `(h, w)` are the finest blocks.
     coarsest: `(Q + 1, C, h', w')`, models of the coarsest grid. differences, shares: coarse to
     fine, what each finer fit adds and how much of it the variances call signal. factor: `(h, w)`,
-    which gives back brightness that the weights took. sums: `(Q + 1 + C, h, w)`, over each block,
-    of a pixel's weight times [1, X - shift, Y]. mean: brightness of the frame.
+    which gives back brightness that the weights took. mean: brightness of
+    the frame.
     """
 
     x: jax.Array
@@ -48,7 +47,6 @@ class Prepared(NamedTuple):
     differences: tuple[jax.Array, ...]
     shares: tuple[jax.Array, ...]
     factor: jax.Array
-    sums: jax.Array
     mean: jax.Array
 
 
@@ -70,11 +68,10 @@ def flnr(
 def init(key: jax.Array, widths: Sequence[int], channels: int = 3) -> unet.Params:
     """Weights with which FLNR is adaptive FLR. widths: channels of the network, fine to coarse.
 
-    Per block of the finest grid: a change of share, a gain for each channel, and what
-    `residual.add_residual` takes; per block of the next two grids all of it but the gains.
+    It gives a change of share per block of the three finest grids, and a gain for each channel per
+    block of the finest.
     """
-    own = 1 + residual.CONTROLS + features.REGRESSORS
-    return unet.init(key, features.COUNT, widths, (4 * (own + channels) + own, own))
+    return unet.init(key, features.COUNT, widths, (4 * (1 + channels) + 1, 1))
 
 
 def prepare(
@@ -90,43 +87,36 @@ def prepare(
     grid = adaptive.collect_grid(target, guides, shift, pilot, weight, numbers, BLOCK)
     coarsest, steps = adaptive.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
     frame = Prepared(
-        x=features.of_steps(steps, shift, mean),
+        x=features.of_steps(steps, shift.size, mean),
         coarsest=coarsest.coefficients,
         differences=tuple(s.fine.coefficients - s.coarse.coefficients for s in steps),
         shares=tuple(step.share for step in steps),
         factor=restoring_factor(steps[-1].merged, moments, shift.size, numbers.slack),
-        sums=grid.moments[_first_moments(shift.size)],
         mean=mean,
     )
     return frame, shift
 
 
-def _first_moments(guides: int) -> np.ndarray:
-    """Planes of the moments of a weighted pixel's [1, X, Y]."""
-    ones = [index_xx(i, 0) for i in range(guides + 1)]
-    return np.array(ones + [index_xy(0, c, guides, 3) for c in range(3)])
-
-
 def finish(params: unet.Params, frame: Prepared) -> jax.Array:
     """Merge the levels and correct the light as the network says: `(Q + 1, C, h, w)`."""
-    finest, *coarser = _controls(params, frame)
+    first, second = unet.apply(params, frame.x)[:2]
+    finest = unet.unpack(first[..., :-1], *frame.factor.shape)
     merged = frame.coarsest
-    changes = (*(control[0] for control in reversed(coarser)), finest[0])
+    changes = (second[..., 0], first[..., -1], finest[0])
     for difference, share, change in zip(frame.differences, frame.shares, changes, strict=True):
-        merged = double(merged, *share.shape) + (share + jnp.tanh(change)) * difference
+        merged = double(merged, *share.shape) + changed(share, change) * difference
     merged = merged * frame.factor
-    gains, finest = finest[1:4], finest[4:]
-    controls = [finest, *(control[1:] for control in coarser)]
-    merged = residual.add_residual(merged, frame.sums, controls, frame.mean)
-    gain = jnp.exp(LARGEST_GAIN * jnp.tanh(gains / LARGEST_GAIN))
+    gain = jnp.exp(_within(finest[1:], LARGEST_GAIN))
     # A gain acts on a little light even where the models predict none.
     floor = features.DARK * frame.mean
     return jnp.concatenate([(merged[:1] + floor) * gain - floor, merged[1:] * gain])
 
 
-def _controls(params: unet.Params, frame: Prepared) -> list[jax.Array]:
-    """What the network says of the blocks of each grid, fine to coarse, `(outputs, h, w)`."""
-    first, second = unet.apply(params, frame.x)[:2]
-    own = second.shape[-1]
-    finest = unet.unpack(first[..., :-own], *frame.factor.shape)
-    return [finest, jnp.moveaxis(first[..., -own:], -1, 0), jnp.moveaxis(second, -1, 0)]
+def changed(share: jax.Array, change: jax.Array) -> jax.Array:
+    """A share whose odds, share : 1 - share, are multiplied by exp(change); within [0, 1]."""
+    odds = jnp.exp(_within(change, LARGEST_CHANGE))
+    return share * odds / (1 + share * (odds - 1))
+
+
+def _within(x: jax.Array, limit: float) -> jax.Array:
+    return limit * jnp.tanh(x / limit)

@@ -1,7 +1,6 @@
 """What must hold of FLNR on any image, whatever its weights."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -53,10 +52,10 @@ def test_pixels_that_do_not_count_change_nothing(scene, params, everywhere):
     np.testing.assert_allclose(other, plain, rtol=1e-4, atol=1e-5)
 
 
-@pytest.mark.parametrize("size", [(1, 1), (3, 70), (33, 8)])
-def test_any_size(params, size):
-    out = regression.flnr(*map(jnp.asarray, scene_of(*size)), params)
-    assert out.shape == (*size, 3)
+def test_a_frame_smaller_than_the_coarsest_blocks(params):
+    target, guides = scene_of(3, 9)
+    out = flnr(target, guides, params, np.ones((3, 9), np.float32))
+    assert out.shape == (3, 9, 3)
     assert np.isfinite(out).all()
 
 
