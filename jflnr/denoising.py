@@ -118,7 +118,12 @@ def denoise_flr(
 ) -> Array:
     """Method `flr`, of a frame or of a part of one."""
     if part is None:
-        part = Part(support_of(parameters, max(frame.normal.shape[:2])))
+        height, width = frame.normal.shape[:2]
+        part = Part(support_of(parameters, max(height, width)))
+        if (height % block or width % block) and _factor(frame) == 1 and _is_numpy(frame):
+            # Sizes that differ by less than a block share a program. NaN counts for nothing.
+            part, padded = part._replace(scene=guide_layers.scene_of(frame)), _pad(frame, block)
+            return denoise_flr(padded, parameters, names, block, backend, part)[:height, :width]
     if backend == "opencl":
         from jflnr import opencl
 
@@ -126,6 +131,20 @@ def denoise_flr(
         support = part.support
         return opencl.flr(parameters=parameters, block=coarse_block, support=support, **images)
     return _denoise(frame, parameters, names, block, *part)
+
+
+def _is_numpy(frame: Frame) -> bool:
+    return all(isinstance(layer, np.ndarray) for layer in jax.tree.leaves(frame))
+
+
+def _pad(frame: Frame, block: int) -> Frame:
+    """The frame with NaN below and to the right, up to whole blocks."""
+
+    def pad(layer: np.ndarray) -> np.ndarray:
+        margins = [(0, -size % block) for size in layer.shape[:2]]
+        return np.pad(layer, [*margins, (0, 0)], constant_values=np.nan)
+
+    return jax.tree.map(pad, frame)
 
 
 def _parameters(given: Any, default: Any) -> Any:

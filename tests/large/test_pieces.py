@@ -2,10 +2,13 @@
 
 import dataclasses
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jflnr
+from jflnr import denoising
 from jflnr.frame import Frame
 from jflnr.large import memory, strips
 from jflnr.large.pieces import pieces
@@ -122,3 +125,16 @@ def test_larger_frames_come_in_smaller_pieces(method):
     assert large > larger > 0
     with pytest.raises(ValueError, match="too little for 16384 x 8192 pixels"):
         memory.tile_for(8192, 16384, gigabyte // 2, method=method)
+
+
+def test_sizes_that_differ_by_less_than_a_block_share_a_program(rng):
+    whole = room(rng, 48, 64)
+    sizes = [(47, 60), (41, 57), (48, 63)]
+    frames = [jax.tree.map(lambda a, h=h, w=w: a[:h, :w], whole) for h, w in sizes]
+    before = denoising._denoise._cache_size()
+    ours = [np.asarray(jflnr.denoise(frame)) for frame in frames]
+    assert denoising._denoise._cache_size() == before + 1
+    # As an array of JAX it is not padded.
+    plain = np.asarray(jflnr.denoise(jax.tree.map(jnp.asarray, frames[1])))
+    assert [image.shape[:2] for image in ours] == sizes
+    assert relative(ours[1], plain) < RELATIVE
