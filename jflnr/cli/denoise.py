@@ -47,6 +47,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--eps", type=float, help="multiplicative regularisation")
     add("--eps-prime", type=float, help="additive regularisation")
     add("--block", type=int, help="side of the squares of pixels that share one model")
+    add(
+        "--error-map",
+        action="store_true",
+        help="with flr-adaptive: add its standard error as the layer `error`",
+    )
     add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
     add(
         "--channels",
@@ -78,6 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     from jflnr.large import memory
 
+    if arguments.error_map and (arguments.method, arguments.backend) != ("flr-adaptive", "jax"):
+        raise ValueError("--error-map needs --method flr-adaptive on the jax backend")
     jobs = plan(arguments.inputs, arguments.output)
     bound = memory.parse(arguments.memory) if arguments.memory else None
     denoiser = Denoiser(settings_of(arguments), arguments, bound, min(len(jobs), 3))

@@ -35,12 +35,13 @@ class Loaded(NamedTuple):
 
 
 class Denoised(NamedTuple):
-    """A frame with its denoised light, by layer."""
+    """A frame with its denoised light, by layer, and that light's standard error if asked for."""
 
     job: Job
     source: layouts.Source
     frame: "Frame"
     lights: dict[str, np.ndarray]
+    error: np.ndarray | None
     about: dict[str, Any]
     record: Record
 
@@ -109,7 +110,6 @@ class Denoiser:
         return Loaded(job, source, frame_of(source))
 
     def _denoise(self, loaded: Loaded) -> Denoised | Record:
-        from jflnr.denoising import denoise
         from jflnr.metrics import measure
 
         job, source, frame, tile = loaded
@@ -130,7 +130,7 @@ class Denoiser:
             warnings.simplefilter("always", UserWarning)
             # The first frame of a kind is denoised twice, to tell compiling from denoising.
             for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
-                light = np.asarray(denoise(noisy, **settings), np.float32)
+                light, light_error = self._light(noisy)
                 times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
@@ -156,12 +156,21 @@ class Denoiser:
             from jflnr.opencl.context import default_context
             from jflnr.opencl.profile import profile
 
-            rows = profile(default_context(), lambda: denoise(noisy, **settings))
+            rows = profile(default_context(), lambda: self._light(noisy))
             record["profile"] = [row._asdict() for row in rows]
         if arguments.reference:
             images = {"noisy": frame.indirect, "denoised": lights["indirect"]}
             record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
-        return Denoised(job, source, frame, lights, about, record)
+        return Denoised(job, source, frame, lights, light_error, about, record)
+
+    def _light(self, frame: "Frame") -> tuple[np.ndarray, np.ndarray | None]:
+        from jflnr.denoising import denoise
+        from jflnr.uncertainty import denoise_with_error
+
+        if not self.arguments.error_map:
+            return np.asarray(denoise(frame, **self.settings), np.float32), None
+        light, error = denoise_with_error(frame, guides=self.settings["guides"])
+        return np.asarray(light), np.asarray(error)
 
     def _write(self, done: Denoised) -> Record:
         start = time.perf_counter()
@@ -207,7 +216,7 @@ def _write(done: Denoised, arguments: argparse.Namespace) -> None:
     from jflnr.cli.preview import write_preview
     from jflnr.metrics import exposure
 
-    job, source, frame, lights, about, _ = done
+    job, source, frame, lights, error, about, _ = done
     picture = picture_of(frame, lights)
     if arguments.png:
         # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
@@ -216,6 +225,8 @@ def _write(done: Denoised, arguments: argparse.Namespace) -> None:
         write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
     mask = None if frame.mask is None else np.asarray(frame.mask)
     channels = layouts.output_channels(source, picture, lights, mask, arguments.channels)
+    if error is not None:
+        channels["error.Y"] = error[..., 0]
     comments = json.dumps(source.header | {"denoiser": about})
     attributes = source.attributes
     exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)

@@ -58,8 +58,8 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile"):
-        if getattr(arguments, option):
+    for option in ("png", "reference", "profile", "error-map"):
+        if getattr(arguments, option.replace("-", "_")):
             raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
     if arguments.channels == "all":
         raise ValueError("--channels all needs the whole frame in memory: raise --memory")

@@ -376,3 +376,15 @@ def test_the_real_thing(tmp_path: Path, frame: Frame, frame_file: Path) -> None:
     light = np.stack([channels[f"indirect.{c}"] for c in "RGB"], axis=-1)
     before, after = (metrics.measure(frame, image) for image in (frame.indirect, light))
     assert after["psnr"] > before["psnr"] + 10
+
+
+def test_error_map(tmp_path: Path, frame: Frame, frame_file: Path, monkeypatch, capsys) -> None:
+    told = np.full((24, 40, 1), 0.25, np.float32)
+    monkeypatch.setattr(
+        "jflnr.uncertainty.denoise_with_error", lambda f, guides: (f.indirect, told)
+    )
+    out = tmp_path / "out.exr"
+    assert run(frame_file, "-o", out, "--error-map", "--method", "flr-adaptive") == 0
+    assert np.all(exr.read_channels(out)["error.Y"] == 0.25)
+    assert run(frame_file, "-o", tmp_path / "other.exr", "--error-map") == 2
+    assert "flr-adaptive" in capsys.readouterr().err
