@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import spearmanr
 
 import jflnr
 from experiments import data, plots, results
@@ -39,7 +40,7 @@ def one(path: Path, spp: int) -> dict[str, float]:
     off, error, inside = errors(path, spp)
     row = {f"{k} %": float(np.mean((off <= z * error)[inside])) for k, z in INTERVALS.items()}
     true, told, whole = (blocks(image) for image in (off**2, error**2, inside.astype(float)))
-    return row | {"rank": spearman(true[whole > 0.99], told[whole > 0.99])}
+    return row | {"rank": float(spearmanr(true[whole > 0.99], told[whole > 0.99]).statistic)}
 
 
 def errors(path: Path, spp: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,12 +56,6 @@ def blocks(image: np.ndarray) -> np.ndarray:
     height, width = (size // BLOCK for size in image.shape)
     image = image[: height * BLOCK, : width * BLOCK]
     return image.reshape(height, BLOCK, width, BLOCK).mean((1, 3))
-
-
-def spearman(a: np.ndarray, b: np.ndarray) -> float:
-    """Correlation of the ranks."""
-    ranks = [np.argsort(np.argsort(values)) for values in (a, b)]
-    return float(np.corrcoef(*ranks)[0, 1])
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
