@@ -15,6 +15,7 @@ import numpy as np
 import jflnr
 from experiments import data, plots, results
 from jflnr import opencl
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
 from jflnr.guides import layers
@@ -29,6 +30,11 @@ OIDN: dict[str, dict[str, Any]] = {
     "OIDN fast": {"quality": "fast", "clean": False},
     "OIDN high": {"quality": "high", "clean": False},
     "OIDN high, clean auxiliaries": {"quality": "high", "clean": True},
+}
+# Methods that have OpenCL kernels, and their constants.
+OPENCL: dict[str, tuple[Callable[..., Any], Any]] = {
+    "flr": (opencl.flr, DEFAULT),
+    "flr-adaptive": (opencl.flr_adaptive, ADAPTIVE_DEFAULT),
 }
 
 
@@ -71,21 +77,27 @@ def methods_on(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
     for method in jflnr.METHODS:
         denoise = functools.partial(jflnr.denoise, on_device, method)
         calls[f"denoise {method}, JAX"] = functools.partial(finished, denoise)
-    calls["denoise flr, OpenCL"] = functools.partial(jflnr.denoise, frame, backend="opencl")
-    calls["flr, OpenCL"] = opencl_call(frame)
+    for method in OPENCL:
+        denoise = functools.partial(jflnr.denoise, frame, method, backend="opencl")
+        calls[f"denoise {method}, OpenCL"] = denoise
+        calls[f"{method}, OpenCL"] = opencl_call(frame, method)
     return calls | oidn_calls(frame)
 
 
-def opencl_call(frame: jflnr.Frame) -> Callable[[], Any]:
-    """The four kernels on the same arrays as `flr, JAX`, in numpy."""
+def opencl_call(frame: jflnr.Frame, method: str = "flr") -> Callable[[], Any]:
+    """The kernels of a method on the same arrays as `flr, JAX`, in numpy."""
     guides = np.concatenate(layers(frame, ("normal", "depth", "ao")), axis=-1)
-    return functools.partial(opencl.flr, np.asarray(frame.indirect), guides, DEFAULT)
+    function, parameters = OPENCL[method]
+    return functools.partial(function, np.asarray(frame.indirect), guides, parameters)
 
 
 def kernels(frame: jflnr.Frame) -> list[dict[str, Any]]:
-    """Each kernel's time, bytes and share of the copy bandwidth."""
-    rows = profile(default_context(), opencl_call(frame))
-    return [row._asdict() | {"mb": row.bytes / 1e6} for row in rows]
+    """Each kernel's time, bytes and share of the copy bandwidth, method by method."""
+    return [
+        row._asdict() | {"mb": row.bytes / 1e6, "method": method}
+        for method in OPENCL
+        for row in profile(default_context(), opencl_call(frame, method))
+    ]
 
 
 def finished(call: Callable[[], Any]) -> Any:
@@ -182,6 +194,7 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     groups = {"groups": "light groups", "together": "together, ms", "separate": "separately, ms"}
     text += "\n" + results.table(result["channels"], groups)
     kernel_columns = {
+        "method": "method",
         "kernel": "kernel",
         "ms": "ms",
         "mb": "MB",

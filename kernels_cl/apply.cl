@@ -8,11 +8,13 @@
 //
 // Defines beside those of the headers: STEP, distance of the models in pixels; RESTORED, if models are
 // multiplied by max(1 + rate * restored, 0) first, `restored` being (ceil(h / 2), restored_pitch), a
-// number for each 2 x 2 models (adaptive FLR, energy.cl).
+// number for each 2 x 2 models (adaptive FLR, energy.cl). The models then lie as in models.h.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "images.h"
+#include "grids.h"
+#include "models.h"
 
 #if !defined(STEP) || STEP < 1
 #error "STEP, the distance of the models in pixels, must be at least 1"
@@ -28,8 +30,15 @@
 #define FROM_CENTRE(i) (i) - CELL(i) * STEP
 #define LEFT(i) CLAMP(cell_x + CELL(i), 0, w - 1)
 #define RIGHT(i) CLAMP(cell_x + CELL(i) + 1, 0, w - 1)
-#define AT_LEFT(i) row[LEFT(i)]
-#define AT_RIGHT(i) row[RIGHT(i)]
+#ifdef RESTORED
+#define BLOCK(bx) COLUMN(bx, MODELS)
+#define ROW(i, by) (model + (long)(by) * pitch * MODELS + (i) * GROUP)
+#else
+#define BLOCK(bx) (bx)
+#define ROW(i, by) (model + ((long)(i) * h + (by)) * pitch)
+#endif
+#define AT_LEFT(i) row[BLOCK(LEFT(i))]
+#define AT_RIGHT(i) row[BLOCK(RIGHT(i))]
 
 // A coefficient along a row of block centres. from, to: factors for the models on both sides.
 INLINE real along(global const float *row, int cell_x, int w, real right, real from, real to)
@@ -70,8 +79,7 @@ kernel void apply(
         const real from = LANES(real, LEFT_FACTOR), to = LANES(real, RIGHT_FACTOR);
 #pragma unroll
         for (int i = 0; i < (Q + 1) * C; ++i) {
-            global const float *row = model + ((long)i * h + by) * pitch;
-            const real value = along(row, cell_x, w, right, from, to);
+            const real value = along(ROW(i, by), cell_x, w, right, from, to);
             if (side == 0)
                 above[i] = value;
             else

@@ -2,6 +2,8 @@
 
 #include "vectors.h"
 #include "sizes.h"
+#include "grids.h"
+#include "models.h"
 
 // Sums in three steps, the same in any order of work-groups: rows, then their total.
 #define SUM(index)                                        \
@@ -35,25 +37,28 @@ kernel void light_mean(int h, global const float *partial, global float *mean)
     mean[1] = total_1;
 }
 
-// Brightness (h, pitch) of the merged models on the blocks of pass 1: the mean of 2 x 2 models
-// `light` (Q + 1, fine_h, fine_pitch), at the mean guides. Global size (w, h).
+// Brightness (h, pitch) of the merged models on the blocks of pass 1: the mean of 2 x 2 models, (fine_h,
+// fine_pitch / GROUP, MODELS, GROUP) with fine_w columns, at the mean guides. Global size (w, h).
 kernel void restored(
     int h, int w, int pitch, int fine_h, int fine_w, int fine_pitch, global const float *moments,
-    global const float *light, global float *output)
+    global const float *models, global float *output)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= w || y >= h) return;
     const long block = (long)y * pitch + x, plane = (long)h * pitch;
     const int x_1 = MIN(2 * x + 1, fine_w - 1), y_1 = MIN(2 * y + 1, fine_h - 1);
+    const long upper_left = AT(2 * x, 2 * y, fine_pitch, MODELS);
+    const long upper_right = AT(x_1, 2 * y, fine_pitch, MODELS);
+    const long lower_left = AT(2 * x, y_1, fine_pitch, MODELS);
+    const long lower_right = AT(x_1, y_1, fine_pitch, MODELS);
     const float per_pixel = moments[block] > 1e-12f ? 1 / moments[block] : 0;
     float sum = 0;
     for (int q = 0; q <= Q; ++q) {
+        global const float *light = models + LIGHT_PLANE(q) * GROUP;
         const float guide = q == 0 ? 1 : moments[XX(q, 0) * plane + block] * per_pixel;
-        global const float *upper = light + ((long)q * fine_h + 2 * y) * fine_pitch;
-        global const float *lower = light + ((long)q * fine_h + y_1) * fine_pitch;
-        sum += guide * (upper[2 * x] + upper[x_1] + lower[2 * x] + lower[x_1]) / 4;
+        sum += guide * (light[upper_left] + light[upper_right] + light[lower_left] + light[lower_right]);
     }
-    output[block] = MAX(sum, 0);
+    output[block] = MAX(sum / 4, 0);
 }
 
 // partial (h, 2): sums over each row of the brightness that is put out, and of its square.

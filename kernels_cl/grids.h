@@ -1,34 +1,61 @@
-// Grids of blocks for adaptive FLR: layouts, and the way from one grid to the next finer one. Comes
-// after vectors.h.
+// Grids of blocks for adaptive FLR: their layout, and the way from one grid to the next finer one.
+// Comes after vectors.h.
 //
-// Defines: REACH, blocks on each side that the window extends over; MARGIN, at least that and a
-// multiple of WIDTH.
-//
-// Planes over h x w blocks are (count, h, pitch), pitch a multiple of GROUP, and mean nothing from
-// column w on. Those that a window goes over are (count, h, MARGIN + pitch + MARGIN), with zeros in
-// the margins and from column w on, so that a pass along rows has no border.
+// Several planes over h x w blocks lie together, (h, pitch / GROUP, count, GROUP): all planes of GROUP
+// neighbours side by side, since separate planes are more streams than a processor can follow. pitch
+// is a multiple of GROUP. Moments are 0 from column w on, other planes mean nothing there.
 
 #define GROUP 8
-#define STRIDE(pitch) ((pitch) + 2 * MARGIN)
+#define COLUMN(x, count) ((long)((x) / GROUP) * (count) * GROUP + (x) % GROUP)
+#define AT(x, y, pitch, count) ((long)(y) * (pitch) * (count) + COLUMN(x, count))
 
-// Lane i lies in a block of the coarse grid, and nearer to one of that block's neighbours.
-#define OWN(i) (0.75f * near[MIN((x + (i)) / 2, w - 1)] + 0.25f * far[MIN((x + (i)) / 2, w - 1)])
-#define NEXT_TO(i) CLAMP((x + (i)) / 2 + ((x + (i)) % 2 ? 1 : -1), 0, w - 1)
-#define OTHER(i) (0.75f * near[NEXT_TO(i)] + 0.25f * far[NEXT_TO(i)])
-#define OWN_LANE(i) LANE(mixed, 1 + (i) / 2)
-#define OTHER_LANE(i) LANE(mixed, (i) % 2 ? 2 + (i) / 2 : (i) / 2)
-
-// Blocks x to x + WIDTH - 1 of row y of a grid twice as fine: bilinear interpolation between the
-// centres of the blocks of `plane`, (h, pitch) with w columns, clamped to the outermost.
-INLINE real doubled(global const float *plane, int h, int w, int pitch, int x, int y)
-{
-    global const float *near = plane + (long)MIN(y / 2, h - 1) * pitch;
-    global const float *far = plane + (long)CLAMP(y / 2 + (y % 2 ? 1 : -1), 0, h - 1) * pitch;
+// Asks a processor for a plane's neighbours to come, where only some of `count` planes are read.
 #if WIDTH > 1
-    const int start = x / 2 - 1;
-    if (start >= 0 && start + WIDTH / 2 + 1 < w && start + WIDTH <= pitch) {
-        const real mixed = 0.75f * READ(near + start) + 0.25f * READ(far + start);
-        return 0.75f * LANES(real, OWN_LANE) + 0.25f * LANES(real, OTHER_LANE);
+#define EXPECT_BLOCK(p, count) __builtin_prefetch((const void *)(size_t)((p) + 8 * GROUP * (count)))
+#else
+#define EXPECT_BLOCK(p, count)
+#endif
+
+// Where blocks x to x + WIDTH - 1 of row y lie in the grid that is half as fine: the nearer and the
+// farther row, and in them the block before the first, the first, and the one after the last.
+typedef struct {
+    global const float *near, *far;
+    long before, own, after;
+    int x, w, count, whole;
+} coarse_t;
+
+INLINE coarse_t coarse_at(global const float *planes, int count, int h, int w, int pitch, int x, int y)
+{
+    coarse_t at;
+    const int own = MIN(x / 2, w - 1), after = x / 2 + MAX(WIDTH / 2, 1);
+    at.near = planes + AT(0, MIN(y / 2, h - 1), pitch, count);
+    at.far = planes + AT(0, CLAMP(y / 2 + (y % 2 ? 1 : -1), 0, h - 1), pitch, count);
+    at.before = COLUMN(MAX(x / 2 - 1, 0), count);
+    at.own = COLUMN(own, count);
+    at.after = COLUMN(MIN(after, w - 1), count);
+    at.x = x;
+    at.w = w;
+    at.count = count;
+    at.whole = after < w;
+    return at;
+}
+
+#define OWN_BLOCK(i) MIN((at->x + (i)) / 2, at->w - 1)
+#define OTHER_BLOCK(i) CLAMP((at->x + (i)) / 2 + ((at->x + (i)) % 2 ? 1 : -1), 0, at->w - 1)
+#define MIXED(offset) (0.75f * near[offset] + 0.25f * far[offset])
+#define MIXED_4(offset) (0.75f * READ_4(near + (offset)) + 0.25f * READ_4(far + (offset)))
+#define OWN(i) MIXED(COLUMN(OWN_BLOCK(i), at->count))
+#define OTHER(i) MIXED(COLUMN(OTHER_BLOCK(i), at->count))
+
+// Plane k there: bilinear interpolation between the centres of the blocks, clamped to the outermost.
+INLINE real doubled(const coarse_t *at, int k)
+{
+    global const float *near = at->near + k * GROUP, *far = at->far + k * GROUP;
+#if WIDTH == 8
+    if (at->whole) {
+        const float4 own = MIXED_4(at->own);
+        const float before = MIXED(at->before), after = MIXED(at->after);
+        return 0.75f * own.s00112233 + 0.25f * (real)(before, own.s1, own.s02, own.s13, own.s2, after);
     }
 #endif
     return 0.75f * LANES(real, OWN) + 0.25f * LANES(real, OTHER);

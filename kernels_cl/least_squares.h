@@ -21,9 +21,11 @@
 #define LOWER(i, j) ((i) * ((i) + 1) / 2 + (j))
 
 // xx, xy: means of [1, X - shift] [1, X - shift]^T (lower triangle) and [1, X - shift] Y^T (row by
-// row). model: the G + 1 rows of C coefficients are written. Vectors of `shift` may differ by lane.
+// row). rounding: relative error of a second moment, of which no more of a variance is known. model: the
+// G + 1 rows of C coefficients are written.
 INLINE void least_squares(
-    const real *xx, const real *xy, const real *shift, real eps, real eps_prime, real *model)
+    const real *xx, const real *xy, const real *shift, real eps, real eps_prime, float rounding,
+    real *model)
 {
     // Row by row: W, scaled to R, then factored in place, R = L L^T; b becomes L^-1 S cov(X, Y).
     real scale[G + 1], l[LOWER(G, 0) + 1], inverse_diagonal[G + 1], b[G * C + 1], value[C];
@@ -33,8 +35,9 @@ INLINE void least_squares(
     for (int i = 0; i < G; ++i) {
         const real mean = xx[XX(i + 1, 0)], mu = mean + shift[i];
         // Rounding can leave a flat guide's variance just below zero.
-        const real variance = xx[XX(i + 1, i + 1)] - mean * mean;
-        scale[i] = rsqrt((variance > 0 ? variance : (real)0) + 2 * eps * mu * mu + eps_prime);
+        const real variance = MAX(xx[XX(i + 1, i + 1)] - mean * mean, 0);
+        const real ridge = 2 * eps * mu * mu + eps_prime + rounding * (variance + mean * mean);
+        scale[i] = rsqrt(variance + ridge);
         real pivot = 1 + eps_prime;
         UNROLL
         for (int j = 0; j < i; ++j) {

@@ -32,15 +32,10 @@ kernel void moments(
             const long pixel = (long)row * width + x0;
             const int last = MIN(right - x0, WIDTH) - 1;
             real x[Q + 1], y[C];
-            if (last == WIDTH - 1) {
-                EXPECT(target, (pixel + AHEAD) * TARGETS);
-                EXPECT(guides_0, (pixel + AHEAD) * PART_0);
-                EXPECT(guides_1, (pixel + AHEAD) * PART_1);
-                EXPECT(guides_2, (pixel + AHEAD) * PART_2);
+            if (last == WIDTH - 1)
                 read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
-            } else {
+            else
                 read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
-            }
             const real one = usable(weight, pixel, last, x, y);
 #pragma unroll
             for (int q = 0; q < Q; ++q) x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;

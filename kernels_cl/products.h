@@ -28,6 +28,12 @@ typedef float weight_t;
 INLINE void read_pixels(
     global const target_t *target, GUIDE_PARAMETERS, long pixel, int last, real *x, real *y)
 {
+    if (last == WIDTH - 1) {
+        EXPECT(target, (pixel + AHEAD) * TARGETS);
+        EXPECT(guides_0, (pixel + AHEAD) * PART_0);
+        EXPECT(guides_1, (pixel + AHEAD) * PART_1);
+        EXPECT(guides_2, (pixel + AHEAD) * PART_2);
+    }
 #pragma unroll
     for (int q = 0; q < Q; ++q) x[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, last);
 #ifdef LIGHT

@@ -4,45 +4,41 @@
 #include "vectors.h"
 #include "grids.h"
 
+// Sums of neighbours: of 2 WIDTH blocks from one to the next group. `there`: whether there is a next.
+INLINE real pair_sums(global const float *first, global const float *next, int there)
+{
 #if WIDTH == 1
-#define PAIR_SUMS(p) ((p)[0] + (p)[1])
-#else
-INLINE real pair_sums(real first, real second)
-{
-#if WIDTH == 8
-    const float16 both = (float16)(first, second);
-#else
-    const float8 both = (float8)(first, second);
-#endif
+    return first[0] + (there ? next[0] : 0);
+#elif WIDTH == 4
+    const float8 both = (float8)(READ(first), there ? READ(next) : (real)0);
     return both.even + both.odd;
-}
-#define PAIR_SUMS(p) pair_sums(READ(p), READ((p) + WIDTH))
+#else
+    const float16 both = (float16)(READ(first), there ? READ(next) : (real)0);
+    return both.even + both.odd;
 #endif
-#define IF_THERE(j) (2 * x + (j) < w ? upper[j] + lower[j] : 0)
-#define ONE_SUM(i) (IF_THERE(2 * (i)) + IF_THERE(2 * (i) + 1))
+}
 
-// planes: (count, h, stride) with w columns from column `start` on. halves: (count, half_h,
-// STRIDE(pitch)). Global size (STRIDE(pitch) / WIDTH, half_h, count).
+// planes: h rows `row` apart of groups `group` apart of `count` planes `plane` apart, zero from column
+// w on up to `pitch`. halves: (half_h, half_pitch / GROUP, count, GROUP).
+// Global size (half_pitch / WIDTH, half_h).
 kernel void halve(
-    int count, int h, int w, int stride, int start, int half_h, int pitch, global const float *planes,
-    global float *halves)
+    int count, int h, int pitch, int row, int group, int plane, int half_h, int half_pitch,
+    global const float *planes, global float *halves)
 {
-    const int column = (int)get_global_id(0) * WIDTH, x = column - MARGIN;
-    const int y = get_global_id(1), plane = get_global_id(2);
-    if (column >= STRIDE(pitch) || y >= half_h || plane >= count) return;
-    global float *half_row = halves + ((long)plane * half_h + y) * STRIDE(pitch) + column;
-    if (x < 0 || 2 * x >= w) {
-        WRITE((real)0, half_row);
+    const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
+    if (x >= half_pitch || y >= half_h) return;
+    halves += AT(x, y, half_pitch, count);
+    const int next = 2 * x + WIDTH, below = 2 * y + 1 < h, there = next < pitch;
+    const long second = (long)(next / GROUP - 2 * x / GROUP) * group + next % GROUP - 2 * x % GROUP;
+    planes += (long)(2 * y) * row + (long)(2 * x / GROUP) * group + 2 * x % GROUP;
+    if (2 * x >= pitch) {
+        for (int k = 0; k < count; ++k) WRITE((real)0, halves + k * GROUP);
         return;
     }
-    global const float *upper = planes + ((long)plane * h + 2 * y) * stride + start + 2 * x;
-    const int last = 2 * y + 1 >= h;
-    global const float *lower = last ? upper : upper + stride;
-    real sums;
-    if (2 * (x + WIDTH) <= w)
-        sums = PAIR_SUMS(upper) + PAIR_SUMS(lower);
-    else
-        sums = LANES(real, ONE_SUM);
-    // Below the last row there are zeros; `lower` repeats `upper` only so as to be readable.
-    WRITE(sums * (last ? 0.125f : 0.25f), half_row);
+    for (int k = 0; k < count; ++k) {
+        global const float *upper = planes + (long)k * plane;
+        real sums = pair_sums(upper, upper + second, there);
+        if (below) sums += pair_sums(upper + row, upper + row + second, there);
+        WRITE(sums / 4, halves + k * GROUP);
+    }
 }

@@ -52,6 +52,15 @@ INLINE float half_sum(float4 v)
     return pair.x + pair.y;
 }
 INLINE float lane_sum(real v) { return half_sum(v.lo + v.hi); }
+// The sums of the lower and the upper halves of four vectors: a, b, c, d below and again above.
+#define ADJACENT(a, b)                                                                     \
+    ((real)((a).s02, (b).s02, (a).s46, (b).s46) + (real)((a).s13, (b).s13, (a).s57, (b).s57))
+INLINE real half_sums(real a, real b, real c, real d)
+{
+    const real ab = ADJACENT(a, b), cd = ADJACENT(c, d);
+    return ADJACENT(ab, cd);
+}
+typedef float2 unaligned_pair __attribute__((aligned(4)));
 #endif
 
 #define LANE_NUMBER(i) (i)
@@ -60,6 +69,8 @@ INLINE float lane_sum(real v) { return half_sum(v.lo + v.hi); }
 typedef real unaligned_real __attribute__((aligned(4)));
 #define READ(p) (*(global const unaligned_real *)(p))
 #define WRITE(v, p) (*(global unaligned_real *)(p) = (v))
+typedef float4 unaligned_float4 __attribute__((aligned(4)));
+#define READ_4(p) (*(global const unaligned_float4 *)(p))
 
 // e^x for x <= 0, to 3e-7 of itself; 0 from -87 on. Inline, unlike the built-in function.
 INLINE real exp_below_0(real x)

@@ -6,7 +6,7 @@
 // The other planes, and which pixels are left out, as in moments.cl. The models of the pilot belong
 // to the centres of squares of 4 x 4 of the blocks here.
 //
-// Defines: those of the headers.
+// Defines beside those of the headers: PROPORTIONAL, if the exponent is 1.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -16,8 +16,10 @@
 #include "grids.h"
 
 // WIDTH divides BLOCK or is twice that; then one work-item covers two blocks side by side.
-#define SIDE_BY_SIDE (WIDTH > BLOCK ? 2 : 1)
+#define ACROSS (WIDTH > BLOCK ? 2 : 1)
 #define STEP (4 * BLOCK)
+// The pilot's are models of one channel, see models.h.
+#define PILOT_PLANES (2 * (Q + 1) + 1)
 
 // The pilot's models along the block centres above, and how they change down to those below, at the
 // pixels x to x + WIDTH - 1 of a cell between four centres.
@@ -26,28 +28,89 @@ INLINE void interpolate_pilot(
     real *down)
 {
     const real right = (LANES(real, LANE_NUMBER) + (x - cell_x * STEP + 0.5f)) / STEP - 0.5f;
-    const int x_0 = MAX(cell_x, 0), x_1 = MIN(cell_x + 1, w - 1);
+    const long left = COLUMN(MAX(cell_x, 0), PILOT_PLANES);
+    const long next = COLUMN(MIN(cell_x + 1, w - 1), PILOT_PLANES);
     const int y_0 = MAX(cell_y, 0), y_1 = MIN(cell_y + 1, h - 1);
 #pragma unroll
     for (int i = 0; i <= Q; ++i) {
-        global const float *row_0 = pilot + ((long)i * h + y_0) * pitch;
-        global const float *row_1 = pilot + ((long)i * h + y_1) * pitch;
-        above[i] = row_0[x_0] + right * (row_0[x_1] - row_0[x_0]);
-        down[i] = row_1[x_0] + right * (row_1[x_1] - row_1[x_0]) - above[i];
+        global const float *row_0 = pilot + AT(0, y_0, pitch, PILOT_PLANES) + i * GROUP;
+        global const float *row_1 = pilot + AT(0, y_1, pitch, PILOT_PLANES) + i * GROUP;
+        above[i] = row_0[left] + right * (row_0[next] - row_0[left]);
+        down[i] = row_1[left] + right * (row_1[next] - row_1[left]) - above[i];
     }
 }
 
-// Global size (STRIDE(pitch) / SIDE_BY_SIDE, h). pilot: (Q + 1, pilot_h, pilot_pitch). mean: the
-// frame's brightness. moments: (K + 1, h, STRIDE(pitch)).
+// Adds the products of the pixels pixel to pixel + last to the sums.
+INLINE void add_pixels(
+    global const target_t *target, GUIDE_PARAMETERS, global const weight_t *weight,
+    constant float *shift, long pixel, int last, float below, const real *above, const real *down,
+    float per_mean, float exponent, float offset, real *sums)
+{
+    real x[Q + 1], y[C];
+    if (last == WIDTH - 1)
+        read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
+    else
+        read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
+    real one = usable(weight, pixel, last, x, y);
+    real expected = above[0] + below * down[0], light = 0;
+#pragma unroll
+    for (int q = 0; q < Q; ++q) {
+        x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
+        expected += x[q] * (above[q + 1] + below * down[q + 1]);
+    }
+#pragma unroll
+    for (int c = 0; c < C; ++c) {
+        y[c] = one > 0 ? y[c] : (real)0;
+        light += BRIGHTNESS(c) * y[c];
+    }
+    real variance = MAX(expected * per_mean, 1e-6f);
+#ifndef PROPORTIONAL
+    variance = pow(variance, (real)exponent);
+#endif
+    one /= variance + offset;
+    const real residual = one * (light - expected);
+    sums[K] += residual * residual;
+    add_products(sums, one, x, y);
+}
+
+// Writes the means over one block, or two side by side.
+INLINE void write_means(const real *sums, global float *block)
+{
+    const float per_pixel = 1.0f / (BLOCK * BLOCK);
+#if WIDTH == 8 && BLOCK == 4
+#define FOURS ((K + 1) / 4 * 4)
+#pragma unroll
+    for (int k = 0; k < FOURS; k += 4) {
+        const real both = per_pixel * half_sums(sums[k], sums[k + 1], sums[k + 2], sums[k + 3]);
+        *(global unaligned_pair *)(block + k * GROUP) = both.s04;
+        *(global unaligned_pair *)(block + (k + 1) * GROUP) = both.s15;
+        *(global unaligned_pair *)(block + (k + 2) * GROUP) = both.s26;
+        *(global unaligned_pair *)(block + (k + 3) * GROUP) = both.s37;
+    }
+#else
+#define FOURS 0
+#endif
+#pragma unroll
+    for (int k = FOURS; k <= K; ++k) {
+#if WIDTH > BLOCK
+        block[k * GROUP] = per_pixel * half_sum(sums[k].lo);
+        block[k * GROUP + 1] = per_pixel * half_sum(sums[k].hi);
+#else
+        block[k * GROUP] = per_pixel * lane_sum(sums[k]);
+#endif
+    }
+}
+
+// Global size (pitch / ACROSS, h). pilot: models of one channel. mean: the frame's brightness. moments:
+// (h, pitch / GROUP, K + 1, GROUP).
 kernel void weighted_moments(
     int width, int height, int h, int pitch, int pilot_h, int pilot_w, int pilot_pitch, float exponent,
     float offset, global const target_t *target, GUIDE_PARAMETERS, global const weight_t *weight,
     constant float *shift, global const float *pilot, global const float *mean,
     global float *moments)
 {
-    const int column = (int)get_global_id(0) * SIDE_BY_SIDE;
-    const int bx = column - MARGIN, by = get_global_id(1);
-    if (column >= STRIDE(pitch) || by >= h) return;
+    const int bx = (int)get_global_id(0) * ACROSS, by = get_global_id(1);
+    if (bx >= pitch || by >= h) return;
 
     real sums[K + 1];
 #pragma unroll
@@ -55,49 +118,18 @@ kernel void weighted_moments(
 
     const float per_mean = 1 / mean[0];
     const int cell_x = (bx + 2) / 4 - 1, cell_y = (by + 2) / 4 - 1;
-    const int top = by * BLOCK, bottom = MIN(top + BLOCK, height);
-    const int left = bx * BLOCK, end = bx < 0 ? left : left + SIDE_BY_SIDE * BLOCK;
-    const int right = MIN(end, width);
+    const int left = bx * BLOCK, right = MIN(left + ACROSS * BLOCK, width);
+    const int top = by * BLOCK, bottom = left < right ? MIN(top + BLOCK, height) : top;
     for (int x0 = left; x0 < right; x0 += WIDTH) {
         real above[Q + 1], down[Q + 1];
         interpolate_pilot(pilot, pilot_h, pilot_w, pilot_pitch, cell_x, cell_y, x0, above, down);
         const int last = MIN(right - x0, WIDTH) - 1;
         for (int row = top; row < bottom; ++row) {
-            const long pixel = (long)row * width + x0;
-            real x[Q + 1], y[C];
-            if (last == WIDTH - 1)
-                read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
-            else
-                read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
-            real one = usable(weight, pixel, last, x, y);
             const float below = (row - cell_y * STEP + 0.5f) / STEP - 0.5f;
-            real expected = above[0] + below * down[0], light = 0;
-#pragma unroll
-            for (int q = 0; q < Q; ++q) {
-                x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
-                expected += x[q] * (above[q + 1] + below * down[q + 1]);
-            }
-#pragma unroll
-            for (int c = 0; c < C; ++c) {
-                y[c] = one > 0 ? y[c] : (real)0;
-                light += BRIGHTNESS(c) * y[c];
-            }
-            real variance = MAX(expected * per_mean, 1e-6f);
-            if (exponent != 1) variance = pow(variance, (real)exponent);
-            one /= variance + offset;
-            const real residual = one * (light - expected);
-            sums[K] += residual * residual;
-            add_products(sums, one, x, y);
+            add_pixels(
+                target, GUIDE_IMAGES, weight, shift, (long)row * width + x0, last, below, above, down,
+                per_mean, exponent, offset, sums);
         }
     }
-    global float *block = moments + (long)by * STRIDE(pitch) + column;
-#pragma unroll
-    for (int k = 0; k <= K; ++k, block += (long)h * STRIDE(pitch)) {
-#if WIDTH > BLOCK
-        block[0] = half_sum(sums[k].lo) * (1.0f / (BLOCK * BLOCK));
-        block[1] = half_sum(sums[k].hi) * (1.0f / (BLOCK * BLOCK));
-#else
-        block[0] = lane_sum(sums[k]) * (1.0f / (BLOCK * BLOCK));
-#endif
-    }
+    write_means(sums, moments + AT(bx, by, pitch, K + 1));
 }

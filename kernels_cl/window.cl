@@ -14,42 +14,39 @@
 #include "window.h"
 #include "rows.h"
 
-INLINE real along_row(global const float *plane, const real *weights)
+INLINE real along_row(global const float *p, int x, int pitch, const real *weights)
 {
     real sum = 0;
-#pragma unroll
-    for (int t = 0; t < TAPS; ++t) sum += weights[t] * READ(plane + t - REACH);
+    FOR_TAPS(p, K + NOISE, ADD_WEIGHTED)
     return sum;
 }
 
-// planes: (K + NOISE, h, STRIDE(pitch)). features: (FEATURES, h, STRIDE(pitch)). rows: see rows.h.
-// Global size (pitch / WIDTH, h).
+// moments: (h, pitch / GROUP, K + NOISE, GROUP). rows: see rows.h. Global size (pitch / WIDTH, h).
 kernel void window_rows(
-    int h, int pitch, float sigma, global const float *features, global const float *planes,
+    int h, int pitch, float sigma, global const float *features, global const float *moments,
     global float *rows)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
-    const long plane = (long)h * STRIDE(pitch), block = (long)y * STRIDE(pitch) + MARGIN + x;
-    planes += block;
-    rows += ROWS_AT(x, y, pitch);
+    moments += AT(x, y, pitch, K + NOISE);
+    rows += AT(x, y, pitch, ROWS);
     real weights[TAPS], more[TAPS];
-    row_weights(features + block, plane, sigma, weights);
-    for (int k = 0; k < K; ++k) WRITE(along_row(planes + k * plane, weights), rows + k * GROUP);
+    row_weights(features, x, y, pitch, sigma, weights);
+#define ALONG(k, weights) along_row(moments + (k) * GROUP, x, pitch, weights)
+    for (int k = 0; k < K; ++k) WRITE(ALONG(k, weights), rows + k * GROUP);
 #if NOISE
 #pragma unroll
     for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * weights[t];
-    WRITE(along_row(planes + K * plane, more), rows + K * GROUP);
+    WRITE(ALONG(K, more), rows + K * GROUP);
 #endif
 #if POSITIONS
+    const float per_sigma = 1 / sigma;
 #pragma unroll
-    for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * ((t - REACH) / sigma);
-    for (int i = 0; i <= Q; ++i)
-        WRITE(along_row(planes + XX(i, 0) * plane, more), rows + ROW_X(i) * GROUP);
-    for (int c = 0; c < C; ++c)
-        WRITE(along_row(planes + XY(0, c) * plane, more), rows + ROW_X(Q + 1 + c) * GROUP);
+    for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * ((t - REACH) * per_sigma);
+    for (int i = 0; i <= Q; ++i) WRITE(ALONG(XX(i, 0), more), rows + ROW_X(i) * GROUP);
+    for (int c = 0; c < C; ++c) WRITE(ALONG(XY(0, c), more), rows + ROW_X(Q + 1 + c) * GROUP);
 #pragma unroll
-    for (int t = 0; t < TAPS; ++t) more[t] *= (t - REACH) / sigma;
-    WRITE(along_row(planes, more), rows + ROW_XX * GROUP);
+    for (int t = 0; t < TAPS; ++t) more[t] *= (t - REACH) * per_sigma;
+    WRITE(ALONG(0, more), rows + ROW_XX * GROUP);
 #endif
 }

@@ -16,10 +16,10 @@ from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output,
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.grids import Grid, Run
-from jflnr.opencl.level import Models, fit_level
+from jflnr.opencl.level import fit_level
 from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
-from jflnr.opencl.pyramid import halve, halve_grid
+from jflnr.opencl.pyramid import halve, halve_planes
 from jflnr.opencl.weighted_moments import collect_weighted
 
 
@@ -79,29 +79,32 @@ def _denoise(
     numbers = jax.tree.map(lambda number: math.exp(float(number)), parameters)
     run = Run(context, count, channels, numbers, shift, mean)
     pilot = fit_pilot(run, moments, w, block)
-    grid = collect_weighted(run, target, guides, pilot, weight, block)
-    merged = fit_pyramid(run, grid, levels)
+    merged = fit_pyramid(
+        run, collect_weighted(run, target, guides, pilot, weight, block), block, levels
+    )
     restored = restore(run, merged, moments, w)
-    size = grid.h, grid.w
-    apply(context, merged.coefficients, guides, shift, block, size, image, restored)
+    apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
 
 
-def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Models:
-    """Models of the brightness on blocks of 4 `block`, from the moments of pass 1 with w columns."""
+def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Grid:
+    """Models of the brightness on blocks of 4 `block`, from the moments of pass 1.
+
+    moments: `(K, h, pitch)`, of one channel, with w columns.
+    """
     run = run._replace(channels=1)
-    return fit_level(run, Grid(halve(run, moments, w), -(-w // 2), 4 * block)).models
+    return fit_level(run, halve_planes(run, moments, w), 4 * block).models
 
 
-def fit_pyramid(run: Run, grid: Grid, levels: int) -> Models:
-    """Models of the finest grid, put together from all levels."""
-    grids = [grid]
+def fit_pyramid(run: Run, moments: Grid, block: int, levels: int) -> Grid:
+    """Models of the finest grid, put together from all levels. block: side of its blocks."""
+    grids = [moments]
     for _ in range(levels - 1):
-        grids.append(halve_grid(run, grids[-1]))
-    coarse = fit_level(run, grids[-1])
+        grids.append(halve(run, grids[-1]))
+    coarse = fit_level(run, grids[-1], block << (levels - 1))
     merged = coarse.models
-    for grid in reversed(grids[:-1]):
-        fine = fit_level(run, grid, merged)
-        share = signal_share(run, grid, fine, coarse)
+    for level in reversed(range(levels - 1)):
+        fine = fit_level(run, grids[level], block << level, merged, slopes=level > 0)
+        share = signal_share(run, fine, coarse)
         merged = merge(run, fine.models, coarse.models, merged, share)
         coarse = fine
     return merged

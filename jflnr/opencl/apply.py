@@ -14,24 +14,26 @@ def apply(
     guides: tuple[Any, ...],
     shift: Any,
     step: int,
-    size: tuple[int, int],
+    sizes: tuple[int, int, int],
     output: Any,
     restored: tuple[Any, Any] | None = None,
 ) -> None:
     """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
 
     model: `(Q + 1, C, h, pitch)`, from `solve`. guides: each `(H, W, Q_i)`. shift: `(max(Q, 1),)`.
-    step: distance of the models in pixels. size: blocks down and across, `(h, w)`. output:
-    `(H, W, C)`, float32 or float16, is written. restored: from `energy.restore`, or None.
+    step: distance of the models in pixels. sizes: blocks down
+    and across, and pitch. output:
+    `(H, W, C)`, float32 or float16, is written. restored: from `energy.restore`, or
+    None; the model is then as in kernels_cl/models.h.
     """
     height, width, channels = output.shape
-    h, w = size
+    h, w, pitch = sizes
     lanes = context.width(step, across=True)
     defines = {**guide_defines(guides, channels), "STEP": step, "WIDTH": lanes}
     if output.dtype == "float16":
         defines["HALF_OUTPUT"] = 1
     arguments = [
-        width, height, h, w, model.shape[3], model, *guide_arguments(guides), shift, output
+        width, height, h, w, pitch, model, *guide_arguments(guides), shift, output
     ]  # fmt: skip
     if restored is not None:
         rate, brightness = restored

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jflnr.opencl.context import Context
-from jflnr.opencl.grids import Run, brightness_defines
-from jflnr.opencl.level import Models
+from jflnr.opencl.grids import Grid, Run, brightness_defines
 from jflnr.opencl.moments import pixel_defines
 
 
@@ -23,16 +22,16 @@ def frame_mean(context: Context, moments: Any, w: int, guides: int) -> Any:
     return mean
 
 
-def restore(run: Run, merged: Models, moments: Any, w: int) -> tuple[Any, Any]:
+def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
     """What the models are to be scaled by, as `apply` takes it: rate and brightness of blocks.
 
     merged: the models of the finest grid. moments: of pass 1, on blocks twice as large, with w
     columns. Returns `(1,)` and `(h, pitch)`.
     """
-    context, defines = run.context, {"Q": run.guides, "C": 1, "WIDTH": 1}
+    context, defines = run.context, {"Q": run.guides, "C": run.channels, "WIDTH": 1}
     h, pitch = moments.shape[1:]
     output, partial, rate = (context.empty(shape) for shape in ((h, pitch), (h, 2), (1,)))
-    arguments = (h, w, pitch, *merged.sizes, moments, merged.light, output)
+    arguments = (h, w, pitch, *merged.sizes, moments, merged.planes, output)
     context.run("restored", "energy.cl", defines, (w, h), arguments)
     arguments = (h, w, pitch, moments, output, partial)
     context.run("restored_rows", "energy.cl", defines, (h,), arguments)

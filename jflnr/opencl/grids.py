@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -12,8 +13,31 @@ from jflnr.flr.level import brightness
 from jflnr.flr.window import REACH
 from jflnr.opencl.context import Context
 
+# Neighbours whose planes lie together.
 GROUP = 8
-MARGIN = -(-REACH // GROUP) * GROUP
+
+
+class Grid(NamedTuple):
+    """Planes over h x w blocks: `(h, pitch / GROUP, count, GROUP)` on the device."""
+
+    planes: Any
+    w: int
+
+    @property
+    def count(self) -> int:
+        return int(self.planes.shape[2])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """h and pitch."""
+        h, groups = self.planes.shape[:2]
+        return int(h), int(groups) * GROUP
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """h, w and pitch, as the kernels take them."""
+        h, pitch = self.size
+        return h, self.w, pitch
 
 
 class Run(NamedTuple):
@@ -31,39 +55,23 @@ class Run(NamedTuple):
     shift: Any
     mean: Any
 
-    def launch(self, name: str, file: str, size: Any, arguments: Any, **defines: int) -> None:
-        """Run a kernel that handles `size` blocks, WIDTH neighbours per work-item."""
+    def grid(self, count: int, h: int, w: int) -> Grid:
+        """A new one, of `count` planes."""
+        return Grid(self.context.empty((h, -(-w // GROUP), count, GROUP)), w)
+
+    def launch(
+        self, name: str, file: str, grid: Grid, arguments: Sequence[Any], **defines: int
+    ) -> None:
+        """Run a kernel on the blocks of a grid, WIDTH neighbours per work-item.
+
+        With a define DOWN neighbouring work-items are below each other.
+        """
         width = self.context.width()
-        everywhere = {"Q": self.guides, "C": self.channels, "WIDTH": width}
-        everywhere |= {"REACH": REACH, "MARGIN": MARGIN} | brightness_defines(self.channels)
-        size = (-(-size[0] // width), *size[1:])
+        everywhere = {"Q": self.guides, "C": self.channels, "WIDTH": width, "REACH": REACH}
+        everywhere |= brightness_defines(self.channels)
+        h, pitch = grid.size
+        size = (h, pitch // width) if defines.get("DOWN") else (pitch // width, h)
         self.context.run(name, file, everywhere | defines, size, arguments)
-
-
-class Grid(NamedTuple):
-    """Moments at one size of block.
-
-    moments: `(K + 1, h, stride)`, the last plane of noise, or `(K, h, stride)`. w: number of blocks
-    across. block: side in pixels.
-    """
-
-    moments: Any
-    w: int
-    block: int
-
-    @property
-    def h(self) -> int:
-        return int(self.moments.shape[1])
-
-
-def pitch_of(w: int) -> int:
-    """Blocks in a row, with those that only fill it up."""
-    return -(-w // GROUP) * GROUP
-
-
-def stride_of(w: int) -> int:
-    """The same, with zeros on both sides for the window."""
-    return pitch_of(w) + 2 * MARGIN
 
 
 @functools.cache

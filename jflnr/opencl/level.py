@@ -1,90 +1,87 @@
-"""Host side of kernels_cl/features.cl, window.cl and level.cl; its twin in JAX is jflnr/flr/level.py."""
+"""One level of adaptive FLR: host side of kernels_cl/features.cl, window.cl and level.cl.
+
+Its twin in JAX is jflnr/flr/level.py.
+"""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from jflnr.flr.elimination import ROUNDING
 from jflnr.flr.moments import plane_count
-from jflnr.opencl.grids import Grid, Run, pitch_of
+from jflnr.opencl.grids import Grid, Run
 
 
-class Models(NamedTuple):
-    """Models of one grid.
+class Level(NamedTuple):
+    """One level and its fit.
 
-    coefficients: `(Q + 1, C, h, pitch)`. light: `(Q + 1, h, pitch)`, the same for the brightness;
-    in a fit one more plane, the variance of what they predict. w: number of blocks across.
+    moments: K planes, weighted, and one of noise. features: the scaled mean guides of each block
+    and, where there is a coarser level, a measure of the brightness found there, and that
+    brightness itself. models: see kernels_cl/models.h. alike: how many of the features must be
+    alike in a window.
     """
 
-    coefficients: Any
-    light: Any
-    w: int
-
-    @property
-    def sizes(self) -> tuple[int, int, int]:
-        """As the kernels take them: h, w, pitch."""
-        h, pitch = self.light.shape[1:]
-        return h, self.w, pitch
+    moments: Grid
+    features: Grid
+    models: Grid
+    alike: int
 
 
-class Fit(NamedTuple):
-    """The models of one level, and the features of the window that they were fitted under.
-
-    features: `(F, h, stride)`: the scaled mean guides of each block and, on all but the coarsest
-    grid, a measure of the brightness that the coarser grids found, and that brightness itself.
-    similar: how many of them must be alike in a window.
-    """
-
-    models: Models
-    features: Any
-    similar: int
-
-
-def fit_level(run: Run, grid: Grid, found: Models | None = None, positions: bool = True) -> Fit:
+def fit_level(
+    run: Run, moments: Grid, side: int, found: Grid | None = None, *, slopes: bool = True
+) -> Level:
     """Fit the models of one level.
 
-    found: what the coarser grids found, None on the coarsest. positions: whether the models may
-    have a slope across the window.
+    moments: K planes, and one of noise if they are weighted. side: of a block in pixels. found:
+    models that the coarser levels found. slopes: whether the position in the window is two more
+    guides.
     """
-    noise = grid.moments.shape[0] - plane_count(run.guides, run.channels)
-    features = window_features(run, grid, found)
-    similar = run.guides + (found is not None)
-    options = {"FEATURES": similar, "NOISE": noise, "POSITIONS": int(positions)}
-    rows = _window_rows(run, grid, features, options)
-    return Fit(_fit(run, grid, features, rows, options), features, similar)
+    features = _features(run, moments, found)
+    alike = run.guides + (found is not None)
+    options = {"FEATURES": alike, "FEATURE_PLANES": features.count, "POSITIONS": int(slopes)}
+    options["NOISE"] = moments.count - plane_count(run.guides, run.channels)
+    rows = _window_rows(run, moments, features, options)
+    return Level(moments, features, _fit(run, rows, side, features, options), alike)
 
 
-def window_features(run: Run, grid: Grid, found: Models | None) -> Any:
-    """What must be alike inside one window, `(F, h, stride)`; see `Fit`."""
+def _features(run: Run, moments: Grid, found: Grid | None) -> Grid:
+    h, w, pitch = moments.sizes
     count = run.guides if found is None else run.guides + 2
-    h, stride = grid.moments.shape[1:]
-    features = run.context.empty((max(count, 1), h, stride))
-    scales = run.numbers.guide_scale, run.numbers.brightness_scale
-    coarse = (0, 0, 0, None) if found is None else (*found.sizes, found.light)
+    features = run.grid(max(count, 1), h, w)
+    coarse, models = ((0, 0, 0), None) if found is None else (found.sizes, found.planes)
     arguments = (
-        h, grid.w, pitch_of(grid.w), *coarse[:3], *scales, run.mean, grid.moments, coarse[3], features
+        h, pitch, *coarse, run.numbers.guide_scale, run.numbers.brightness_scale, run.mean,
+        moments.planes, models, features.planes,
     )  # fmt: skip
-    run.launch("features", "features.cl", (stride, h), arguments, REFINES=int(found is not None))
+    defines = {"REFINES": int(found is not None), "COUNT": moments.count}
+    run.launch("features", "features.cl", moments, arguments, **defines)
     return features
 
 
-def _window_rows(run: Run, grid: Grid, features: Any, options: dict[str, int]) -> Any:
-    """The window along rows, in the layout of kernels_cl/rows.h."""
-    pitch = pitch_of(grid.w)
-    count = grid.moments.shape[0] + options["POSITIONS"] * (run.guides + run.channels + 2)
-    rows = run.context.empty((grid.h, pitch, count))
-    arguments = (grid.h, pitch, run.numbers.sigma, features, grid.moments, rows)
-    run.launch("window_rows", "window.cl", (pitch, grid.h), arguments, **options)
+def _window_rows(run: Run, moments: Grid, features: Grid, options: dict[str, int]) -> Grid:
+    """The window along rows: the planes of kernels_cl/rows.h."""
+    h, w, pitch = moments.sizes
+    count = moments.count + options["POSITIONS"] * (run.guides + run.channels + 2)
+    rows = run.grid(count, h, w)
+    arguments = (h, pitch, run.numbers.sigma, features.planes, moments.planes, rows.planes)
+    run.launch("window_rows", "window.cl", moments, arguments, **options)
     return rows
 
 
-def _fit(run: Run, grid: Grid, features: Any, rows: Any, options: dict[str, int]) -> Models:
+def _fit(run: Run, rows: Grid, side: int, features: Grid, options: dict[str, int]) -> Grid:
     """The window along columns, and least squares."""
-    h, pitch, numbers = grid.h, pitch_of(grid.w), run.numbers
-    coefficients = run.context.empty((run.guides + 1, run.channels, h, pitch))
-    light = run.context.empty((run.guides + 2, h, pitch))
+    h, w, pitch = rows.sizes
+    models = new_models(run, h, w)
+    numbers = run.numbers
     arguments = (
-        h, pitch, grid.block, numbers.sigma, numbers.eps, numbers.eps_prime, numbers.noise_ridge,
-        numbers.position_ridge, run.mean, run.shift, features, rows, coefficients, light,
+        h, pitch, side, numbers.sigma, numbers.eps, numbers.eps_prime, numbers.noise_ridge,
+        numbers.position_ridge, run.mean, run.shift, features.planes, rows.planes, models.planes,
     )  # fmt: skip
-    run.launch("fit", "level.cl", (pitch, h), arguments, **options)
-    return Models(coefficients, light, grid.w)
+    options = {**options, "ROUNDING": ROUNDING, "DOWN": int(run.context.on_cpu)}
+    run.launch("fit", "level.cl", rows, arguments, **options)
+    return models
+
+
+def new_models(run: Run, h: int, w: int) -> Grid:
+    """Room for the planes of kernels_cl/models.h."""
+    return run.grid((run.guides + 1) * (run.channels + 1) + 1, h, w)

@@ -2,47 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from jflnr.opencl.grids import Grid, Run, pitch_of
-from jflnr.opencl.level import Fit, Models
+from jflnr.opencl.grids import Grid, Run
+from jflnr.opencl.level import Level, new_models
 from jflnr.opencl.pyramid import halve
 
 
-def signal_share(run: Run, grid: Grid, fine: Fit, coarse: Fit) -> Any:
-    """The share of signal in the difference between two levels, `(h, pitch)` on the coarser grid.
+def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
+    """The share of signal in the difference between two levels, one plane on the coarser grid.
 
-    grid, fine: the finer level. coarse: the next coarser one, over whose window means are taken.
+    Means are taken under the windows of the coarser level.
     """
-    h, w, pitch = fine.models.sizes
-    signal = run.context.empty((3, h, pitch))
+    options = {"FEATURES": coarse.alike, "FEATURE_PLANES": coarse.features.count}
+    signal = halve(run, _signal(run, fine, coarse, options))
+    h, w, pitch = signal.sizes
+    rows, share = run.grid(3, h, w), run.grid(1, h, w)
+    sizes = h, pitch, run.numbers.sigma
+    arguments = (*sizes, coarse.features.planes, signal.planes, rows.planes)
+    run.launch("share_rows", "merge.cl", signal, arguments, COUNT=0, **options)
     arguments = (
-        h, pitch, *coarse.models.sizes, run.numbers.guide_scale, run.mean, grid.moments,
-        fine.features, fine.models.light, coarse.models.light, signal,
+        *sizes, run.numbers.caution, coarse.features.planes, rows.planes, share.planes
     )  # fmt: skip
-    run.launch("signal", "merge.cl", (pitch, h), arguments, FEATURES=coarse.similar)
-    return _share(run, halve(run, signal, w), coarse)
-
-
-def _share(run: Run, halved: Any, coarse: Fit) -> Any:
-    h, w = halved.shape[1], coarse.models.w
-    pitch, numbers = pitch_of(w), run.numbers
-    rows, share = run.context.empty((3, h, pitch)), run.context.empty((h, pitch))
-    arguments = (h, pitch, numbers.sigma, coarse.features, halved, rows)
-    run.launch("share_rows", "merge.cl", (pitch, h), arguments, FEATURES=coarse.similar)
-    arguments = (h, pitch, numbers.sigma, numbers.caution, coarse.features, rows, share)
-    run.launch("share_columns", "merge.cl", (pitch, h), arguments, FEATURES=coarse.similar)
+    run.launch("share_columns", "merge.cl", signal, arguments, COUNT=0, **options)
     return share
 
 
-def merge(run: Run, fine: Models, coarse: Models, merged: Models, share: Any) -> Models:
-    """`merged + share (fine - coarse)` on the finer grid."""
-    h, w, pitch = fine.sizes
-    coefficients = run.context.empty(fine.coefficients.shape)
-    light = run.context.empty((run.guides + 1, h, pitch))
+def _signal(run: Run, fine: Level, coarse: Level, options: dict[str, int]) -> Grid:
+    """Squared difference, what noise would make of it, and where there are pixels: three planes."""
+    h, w, pitch = fine.models.sizes
+    signal = run.grid(3, h, w)
     arguments = (
-        h, pitch, *coarse.sizes, fine.coefficients, coarse.coefficients, merged.coefficients, share,
-        coefficients, light,
+        h, pitch, *coarse.models.sizes, run.numbers.guide_scale, run.mean, fine.moments.planes,
+        fine.features.planes, fine.models.planes, coarse.models.planes, signal.planes,
     )  # fmt: skip
-    run.launch("merge", "merge.cl", (pitch, h), arguments, FEATURES=0)
-    return Models(coefficients, light, w)
+    run.launch("signal", "merge.cl", signal, arguments, COUNT=fine.moments.count, **options)
+    return signal
+
+
+def merge(run: Run, fine: Grid, coarse: Grid, merged: Grid, share: Grid) -> Grid:
+    """Models `merged + share (fine - coarse)` on the finer grid."""
+    h, w, pitch = fine.sizes
+    result = new_models(run, h, w)
+    arguments = (
+        h, pitch, *coarse.sizes, fine.planes, coarse.planes, merged.planes, share.planes,
+        result.planes,
+    )  # fmt: skip
+    run.launch("merge", "merge.cl", fine, arguments, COUNT=0, FEATURES=0, FEATURE_PLANES=0)
+    return result

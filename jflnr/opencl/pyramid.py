@@ -4,23 +4,29 @@ from __future__ import annotations
 
 from typing import Any
 
-from jflnr.opencl.grids import MARGIN, Grid, Run, stride_of
+from jflnr.opencl.grids import GROUP, Grid, Run
 
 
-def halve(run: Run, planes: Any, w: int, start: int = 0) -> Any:
-    """Mean of 2 x 2 blocks, zeros beyond the border.
+def halve(run: Run, grid: Grid) -> Grid:
+    """Mean of 2 x 2 blocks, zeros beyond the border."""
+    (h, pitch), count = grid.size, grid.count
+    strides = pitch * count, GROUP * count, GROUP
+    return _halve(
+        run, grid.planes, (h, pitch), strides, run.grid(count, -(-h // 2), -(-grid.w // 2))
+    )
 
-    planes: `(K, h, stride)` with w columns from column `start` on.
-    Returns `(K, ceil(h / 2), stride)`, with margins.
-    """
-    count, h, stride = planes.shape
-    half_h, half_stride = -(-h // 2), stride_of(-(-w // 2))
-    halves = run.context.empty((count, half_h, half_stride))
-    sizes = (count, h, w, stride, start, half_h, half_stride - 2 * MARGIN)
-    run.launch("halve", "pyramid.cl", (half_stride, half_h, count), (*sizes, planes, halves))
+
+def halve_planes(run: Run, planes: Any, w: int) -> Grid:
+    """The same from separate planes `(K, h, pitch)` with w columns, and zeros from there on."""
+    count, h, pitch = planes.shape
+    strides = pitch, GROUP, h * pitch
+    return _halve(run, planes, (h, pitch), strides, run.grid(count, -(-h // 2), -(-w // 2)))
+
+
+def _halve(
+    run: Run, planes: Any, size: tuple[int, int], strides: tuple[int, int, int], halves: Grid
+) -> Grid:
+    """strides: from one row, group of neighbours and plane to the next."""
+    arguments = (halves.count, *size, *strides, *halves.size, planes, halves.planes)
+    run.launch("halve", "pyramid.cl", halves, arguments)
     return halves
-
-
-def halve_grid(run: Run, grid: Grid) -> Grid:
-    """The same moments at blocks twice as large."""
-    return Grid(halve(run, grid.moments, grid.w, MARGIN), -(-grid.w // 2), 2 * grid.block)

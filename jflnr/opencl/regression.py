@@ -57,7 +57,7 @@ def flr(
     reach = min(-(-support // step), max(size))
     moments = blur(context, moments, float(parameters.sigma) / step, reach)
     model = solve(context, moments, shift, parameters, count, channels)
-    apply(context, model, x_map, shift, step, size, output)
+    apply(context, model, x_map, shift, step, (*size, model.shape[3]), output)
     return context.finish(output, result)
 
 

@@ -1,52 +1,54 @@
-"""Adaptive FLR in OpenCL against JAX in float64: numbers of guides and channels, awkward frames."""
+"""Adaptive FLR in OpenCL against JAX: numbers of guides and channels, awkward frames."""
 
 import functools
 from collections.abc import Callable
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 
 from jflnr.flr.adaptive import flr_adaptive as jax_adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.opencl import Context, flr_adaptive
+from jflnr.flr.noisy_guides import smooth_guide as jax_smooth
+from jflnr.opencl import Context, flr_adaptive, smooth_guide
 from tests.opencl import tolerances
-from tests.opencl.conftest import error, in_float64, scene
+from tests.opencl.conftest import QUICK, error, scene
 
 SIZE = (61, 203)
 PARAMETERS = ADAPTIVE_DEFAULT.but(exponent=0.8)
+# Guides that the JAX program is compiled for. One that is zero changes nothing.
+MOST = 8
 
 
 @functools.cache
 def by_jax(**options: Any) -> Callable[..., np.ndarray]:
-    return in_float64(jax_adaptive, parameters=PARAMETERS, **options)
-
-
-def everywhere() -> np.ndarray:
-    return np.ones(SIZE, np.float32)
+    program = functools.partial(jax_adaptive, parameters=PARAMETERS, **options)
+    compiled = jax.jit(program, compiler_options=QUICK)
+    return lambda *arrays, **named: np.asarray(compiled(*arrays, **named))
 
 
 def compare(
-    context: Context, target: np.ndarray, guides: Any, weight: np.ndarray, **options: Any
+    context: Context,
+    target: np.ndarray,
+    guides: np.ndarray,
+    weight: np.ndarray | None = None,
+    **options: Any,
 ) -> float:
     found = flr_adaptive(target, guides, PARAMETERS, weight=weight, context=context, **options)
-    weight = weight.astype(np.float32)
-    return error(found, by_jax(**options)(target, guides, weight=weight))
+    guides = np.pad(guides, ((0, 0), (0, 0), (0, MOST - guides.shape[2])))
+    weight = np.ones(target.shape[:2]) if weight is None else weight
+    return error(found, by_jax(**options)(target, guides, weight=weight.astype(np.float32)))
 
 
-@pytest.mark.parametrize("count", [1, 2, 5, 8])
+@pytest.mark.parametrize("count", [1, 5, 8])
 def test_numbers_of_guides(context: Context, count: int) -> None:
-    """Against one JAX program: a guide that is zero changes nothing."""
-    target, guides = scene(*SIZE, 8, 3)
-    found = flr_adaptive(target, guides[..., :count], PARAMETERS, context=context)
-    fewer = np.where(np.arange(8) < count, guides, 0)
-    right = by_jax()(target, fewer, weight=everywhere())
-    assert error(found, right) < tolerances.ADAPTIVE
+    assert compare(context, *scene(*SIZE, count, 3)) < tolerances.ADAPTIVE
 
 
 @pytest.mark.parametrize("kind", ["numbers", "mask"])
 def test_weights_and_spoiled_pixels(context: Context, kind: str) -> None:
-    target, guides = scene(*SIZE, 8, 3)
+    target, guides = scene(*SIZE, 5, 3)
     weight = np.random.default_rng(0).uniform(-0.5, 1, SIZE).astype(np.float32)
     weight[:24, :70] = 0
     weight[3, 104:107] = np.nan, np.inf, 0
@@ -56,10 +58,10 @@ def test_weights_and_spoiled_pixels(context: Context, kind: str) -> None:
 
 
 def test_no_light(context: Context) -> None:
-    target, guides = scene(*SIZE, 8, 3)
+    target, guides = scene(*SIZE, 5, 3)
     assert not flr_adaptive(np.zeros_like(target), guides, PARAMETERS, context=context).any()
     target[:, :100] = 0
-    assert compare(context, target, guides, everywhere()) < tolerances.ADAPTIVE
+    assert compare(context, target, guides) < tolerances.ADAPTIVE
 
 
 def test_nothing_usable_gives_zero(context: Context) -> None:
@@ -68,13 +70,13 @@ def test_nothing_usable_gives_zero(context: Context) -> None:
 
 
 def test_energy_is_kept(context: Context) -> None:
-    target, guides = scene(*SIZE, 8, 3)
-    weight = everywhere() * (np.arange(203) > 20)
+    target, guides = scene(*SIZE, 5, 3)
+    weight = np.broadcast_to(np.arange(203) > 20, SIZE)
     target[40, 50] = np.inf
     found = flr_adaptive(
         target, guides, PARAMETERS, weight=weight, keep_energy=True, context=context
     )
-    counts = np.isfinite(target).all(2) & (weight > 0)
+    counts = np.isfinite(target).all(2) & weight
     luminance = np.array([0.2126, 0.7152, 0.0722])
     before, after = (np.sum(image[counts] @ luminance) for image in (target, found))
     assert abs(after / before - 1) < 1e-5
@@ -90,20 +92,19 @@ def test_light_groups_sum_to_the_sum(context: Context) -> None:
     assert error(groups[..., :3] + groups[..., 3:], found) < tolerances.ADAPTIVE
 
 
-@pytest.mark.parametrize(("size", "block"), [((1, 1), 8), ((9, 13), 8), ((33, 70), 2)])
-def test_sizes_and_blocks(context: Context, size: tuple[int, int], block: int) -> None:
-    target, guides = scene(*size, 2, 1)
-    weight = np.ones(size, np.float32)
-    assert compare(context, target, guides, weight, block=block, levels=3) < tolerances.ADAPTIVE
+@pytest.mark.parametrize(("size", "block"), [((1, 1), 8), ((9, 13), 2)])
+def test_small_frames(context: Context, size: tuple[int, int], block: int) -> None:
+    target, guides = scene(*size, 5, 3)
+    assert compare(context, target, guides, block=block, levels=3) < tolerances.ADAPTIVE
 
 
-@pytest.mark.parametrize("block", [6, 12, 16, 24, 32])
-def test_vectors_and_blocks_of_every_kind(context: Context, gpu_like: Context, block: int) -> None:
-    """Vectors across two blocks, one block, a part of it: the same as pixel by pixel."""
-    target, guides = scene(*SIZE, 3, 4)
+@pytest.mark.parametrize("block", [6, 12, 16, 24])
+def test_blocks(context: Context, gpu_like: Context, block: int) -> None:
+    """Vectors across two blocks, one or a part of it give the same as single pixels."""
+    target, guides = scene(*SIZE, 5, 3)
     found, right = (
-        flr_adaptive(target, guides, PARAMETERS, block=block, context=c)
-        for c in (context, gpu_like)
+        flr_adaptive(target, guides, PARAMETERS, block=block, context=device)
+        for device in (context, gpu_like)
     )
     assert error(found, right) < tolerances.ADAPTIVE
 
@@ -144,3 +145,16 @@ def test_wrong_arguments(context: Context) -> None:
         flr_adaptive(target, guides, PARAMETERS, context=context, levels=0)
     with pytest.raises(ValueError, match="guides has 17 channels"):
         flr_adaptive(target, np.zeros((20, 30, 17), np.float32), PARAMETERS, context=context)
+
+
+@pytest.mark.parametrize("size", [(37, 83), (1, 1), (16, 32)])
+def test_smoothing_of_a_noisy_guide(context: Context, size: tuple[int, int]) -> None:
+    random = np.random.default_rng(0)
+    normal = random.normal(0, 0.1, (*size, 3)).astype(np.float32)
+    depth = random.uniform(1, 1.05, (*size, 1)).astype(np.float32)
+    noisy = random.uniform(0, 1, (*size, 1)).astype(np.float32)
+    if size[0] > 10:
+        noisy[3, 4], noisy[1, 1], normal[2, 2, 1], depth[4, 6] = np.nan, np.inf, np.nan, np.inf
+    found = smooth_guide(noisy, normal, depth, context).get()
+    right = np.asarray(jax_smooth(noisy, normal, depth))
+    np.testing.assert_allclose(found, right, rtol=1e-5)

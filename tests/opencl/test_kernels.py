@@ -124,7 +124,7 @@ def test_apply(context: Context, counts: tuple[int, int], size: tuple[int, int],
         (context.array(guides),) if counts[0] else (),
         context.array(shift),
         step,
-        blocks,
+        (*blocks, padded(context, model).shape[-1]),
         context.array(image, writable=True),
     )
     context.queue.finish()

@@ -1,0 +1,29 @@
+"""Host side of kernels_cl/noisy_guides.cl; its twin in JAX is jflnr/flr/noisy_guides.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jflnr.flr.noisy_guides import DEPTH, NORMAL
+from jflnr.opencl.arguments import to_layers
+from jflnr.opencl.context import Context, default_context
+from jflnr.opencl.moments import guide_arguments, guide_defines
+
+
+def smooth_guide(guide: Any, normal: Any, depth: Any, context: Context | None = None) -> Any:
+    """Average a guide over 3 x 3 pixels of the same surface: along rows, then along columns.
+
+    guide: `(H, W, 1)`. normal: `(H, W, 3)`. depth: `(H, W, 1)`. Returns `(H, W, 1)` float32, on the
+    device.
+    """
+    context = default_context() if context is None else context
+    layers = to_layers(context, (normal, depth, guide))
+    height, width = normal.shape[:2]
+    lanes = context.width()
+    defines = {**guide_defines(layers, 1), "WIDTH": lanes}
+    rows, smooth = context.empty((height, width, 1)), context.empty((height, width, 1))
+    arguments = (width, height, 1 / NORMAL, DEPTH, *guide_arguments(layers))
+    size = -(-width // lanes), height
+    context.run("smooth_rows", "noisy_guides.cl", defines, size, (*arguments, rows))
+    context.run("smooth_columns", "noisy_guides.cl", defines, size, (*arguments, rows, smooth))
+    return smooth
