@@ -7,13 +7,20 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, sentence
+from jflnr.cli.content import (
+    about_of,
+    not_finite_pixels,
+    picture_of,
+    split,
+    spp_of,
+    with_direct,
+)
 from jflnr.cli.jobs import Job, make_folder
 
 if TYPE_CHECKING:
@@ -148,7 +155,7 @@ class Denoiser:
             "compile_seconds": times[-2] - times[0],
             "warnings": [
                 *{str(warning.message): None for warning in caught},
-                *_not_finite(frame),
+                *not_finite_pixels(frame),
                 *([DIRECT] if left else []),
             ],
         }
@@ -191,25 +198,6 @@ def _record(job: Job) -> Record:
     return {"input": str(job.source), "output": str(job.target)}
 
 
-def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
-    """The samples per pixel of a file of ours."""
-    return arguments.spp if layouts.native.spp_present(source.channels) else None
-
-
-def split(light: np.ndarray) -> dict[str, np.ndarray]:
-    """Denoised light `(H, W, 3)` or `(H, W, 6)` by layer."""
-    lights = {"indirect": light[..., :3]}
-    return lights | ({"direct": light[..., 3:]} if light.shape[-1] > 3 else {})
-
-
-def with_direct(frame: "Frame", path: Path) -> "Frame":
-    """The frame whose light to denoise, (H, W, 6), is the indirect and the direct one."""
-    if frame.direct is None:
-        raise ValueError(f"{path}: --direct needs a layer of direct light, and there is none")
-    light = np.concatenate([frame.indirect, frame.direct], axis=-1)
-    return dataclasses.replace(frame, indirect=light)
-
-
 def _write(done: Denoised, arguments: argparse.Namespace) -> None:
     """Write the preview, if asked for, and the EXR, with the input's header and windows."""
     from jflnr import exr
@@ -230,36 +218,3 @@ def _write(done: Denoised, arguments: argparse.Namespace) -> None:
     comments = json.dumps(source.header | {"denoiser": about})
     attributes = source.attributes
     exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
-
-
-def picture_of(frame: "Frame", lights: dict[str, np.ndarray]) -> np.ndarray:
-    """The picture `(H, W, 3)` with the denoised light in it."""
-    from jflnr.frame import composite
-
-    frame = dataclasses.replace(frame, direct=lights.get("direct", frame.direct))
-    return np.asarray(composite(frame, lights["indirect"]), np.float32)
-
-
-def about_of(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[str, Any]:
-    """What was done, for the record and for the header of the output."""
-    from jflnr.guides import choose
-
-    model = settings.get("parameters")
-    names = ("sigma", "eps", "eps_prime") if model else ()
-    return {
-        "method": settings["method"],
-        "backend": settings["backend"],
-        "spp": spp,
-        "guides": list(choose(frame, settings["guides"])),
-        "block": settings["block"],
-        **{name: float(getattr(model, name)) for name in names},
-    }
-
-
-def _not_finite(frame: "Frame") -> list[str]:
-    from jflnr.frame import not_finite
-
-    if not (counts := not_finite(frame)):
-        return []
-    listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
-    return [f"pixels that are NaN or infinite (the fit leaves them out): {listed}"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from jflnr import layouts
-from jflnr.cli.frames import about_of, picture_of, split, spp_of, with_direct
+from jflnr.cli.content import about_of, picture_of, split, spp_of, with_direct
 from jflnr.cli.jobs import Job
 from jflnr.frame import Frame, frame_of
 from jflnr.large import strips
