@@ -65,12 +65,13 @@ def denoise(
     names, inputs = prepare(frame, guides)
     if method == "flr-adaptive":
         settings = _parameters(parameters, ADAPTIVE_DEFAULT)
-        if backend != "jax":
-            raise ValueError("method flr-adaptive runs on the jax backend only")
+        if backend != "jax" and tile is not None:
+            raise ValueError("method flr-adaptive works in tiles on the jax backend only")
         if inputs.indirect.shape[:2] != inputs.normal.shape[:2]:
             raise ValueError("method flr-adaptive needs frame.indirect at the size of the guides")
         if tile is None:
-            return _denoise_adaptive(inputs, settings, names, block, keep_energy)
+            run = _denoise_adaptive if backend == "jax" else _denoise_adaptive_opencl
+            return run(inputs, settings, names, block, keep_energy)
     else:
         settings = _parameters(parameters, DEFAULT)
         if tile is None:
@@ -258,3 +259,23 @@ def _denoise_adaptive(
 ) -> jax.Array:
     images = adaptive_images(frame, names)
     return flr_adaptive(parameters=parameters, block=block, keep_energy=keep_energy, **images)
+
+
+def _denoise_adaptive_opencl(
+    frame: Frame,
+    parameters: AdaptiveParameters,
+    names: tuple[str, ...],
+    block: int,
+    keep_energy: bool,
+) -> np.ndarray:
+    from jflnr import opencl
+
+    images = _images(frame, names)
+    if "ao" in names:
+        layers = list(images["guides"])
+        ao = names.index("ao")
+        layers[ao] = opencl.smooth_guide(layers[ao], frame.normal, frame.depth)
+        images["guides"] = tuple(layers)
+    return opencl.flr_adaptive(
+        parameters=parameters, block=block, keep_energy=keep_energy, **images
+    )
