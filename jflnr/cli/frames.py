@@ -61,9 +61,8 @@ class Denoiser:
     written; later stages pass that on.
 
     settings: keyword arguments of `jflnr.denoise`. arguments: of the command line. memory: bytes
-    that frames may take, None for a share of what is free. at_once: how many there may be in
-    memory. compiled: shapes of the frames
-    there are programs for, None if nobody asks.
+    that frames may take, None for a share of what is free. at_once: how many may be in memory.
+    compiled: shapes of the frames that there are programs for, None if nobody asks.
     """
 
     settings: dict[str, Any]
