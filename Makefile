@@ -31,7 +31,7 @@ $(VENV)/demo: pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(VENV)/test: pyproject.toml | $(VENV)/bin/python
-	$(RUN) -m pip install --quiet --editable '.[opencl,experiments,site,browser,dev]'
+	$(RUN) -m pip install --quiet --editable '.[opencl,large,cluster,experiments,site,browser,dev]'
 	@touch $@ $(VENV)/demo
 
 clean:
