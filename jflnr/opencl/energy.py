@@ -31,12 +31,12 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
     context, defines = run.context, {"Q": run.guides, "C": run.channels, "WIDTH": 1}
     h, pitch = moments.shape[1:]
     output, partial, rate = (context.empty(shape) for shape in ((h, pitch), (h, 2), (1,)))
-    arguments = (h, w, pitch, *merged.sizes, moments, merged.planes, output)
-    context.run("restored", "energy.cl", defines, (w, h), arguments)
-    arguments = (h, w, pitch, moments, output, partial)
-    context.run("restored_rows", "energy.cl", defines, (h,), arguments)
-    arguments = (h, run.numbers.slack, partial, run.mean, rate)
-    context.run("restore", "energy.cl", defines, (1,), arguments)
+    blocks = h, w, pitch, *merged.sizes, moments, merged.planes, output
+    context.run("restored", "energy.cl", defines, (w, h), blocks)
+    rows = h, w, pitch, moments, output, partial
+    context.run("restored_rows", "energy.cl", defines, (h,), rows)
+    total = h, run.numbers.slack, partial, run.mean, rate
+    context.run("restore", "energy.cl", defines, (1,), total)
     return rate, output
 
 

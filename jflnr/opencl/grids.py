@@ -24,7 +24,8 @@ class Grid(NamedTuple):
     w: int
 
     @property
-    def count(self) -> int:
+    def number(self) -> int:
+        """Of planes."""
         return int(self.planes.shape[2])
 
     @property

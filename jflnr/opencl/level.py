@@ -38,8 +38,8 @@ def fit_level(
     """
     features = _features(run, moments, found)
     alike = run.guides + (found is not None)
-    options = {"FEATURES": alike, "FEATURE_PLANES": features.count, "POSITIONS": int(slopes)}
-    options["NOISE"] = moments.count - plane_count(run.guides, run.channels)
+    options = {"FEATURES": alike, "FEATURE_PLANES": features.number, "POSITIONS": int(slopes)}
+    options["NOISE"] = moments.number - plane_count(run.guides, run.channels)
     rows = _window_rows(run, moments, features, options)
     return Level(moments, features, _fit(run, rows, side, features, options), alike)
 
@@ -53,7 +53,7 @@ def _features(run: Run, moments: Grid, found: Grid | None) -> Grid:
         h, pitch, *coarse, run.numbers.guide_scale, run.numbers.brightness_scale, run.mean,
         moments.planes, models, features.planes,
     )  # fmt: skip
-    defines = {"REFINES": int(found is not None), "COUNT": moments.count}
+    defines = {"REFINES": int(found is not None), "COUNT": moments.number}
     run.launch("features", "features.cl", moments, arguments, **defines)
     return features
 
@@ -61,7 +61,7 @@ def _features(run: Run, moments: Grid, found: Grid | None) -> Grid:
 def _window_rows(run: Run, moments: Grid, features: Grid, options: dict[str, int]) -> Grid:
     """The window along rows: the planes of kernels_cl/rows.h."""
     h, w, pitch = moments.sizes
-    count = moments.count + options["POSITIONS"] * (run.guides + run.channels + 2)
+    count = moments.number + options["POSITIONS"] * (run.guides + run.channels + 2)
     rows = run.grid(count, h, w)
     arguments = (h, pitch, run.numbers.sigma, features.planes, moments.planes, rows.planes)
     run.launch("window_rows", "window.cl", moments, arguments, **options)

@@ -12,17 +12,15 @@ def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
 
     Means are taken under the windows of the coarser level.
     """
-    options = {"FEATURES": coarse.alike, "FEATURE_PLANES": coarse.features.count}
+    options = {"FEATURES": coarse.alike, "FEATURE_PLANES": coarse.features.number}
     signal = halve(run, _signal(run, fine, coarse, options))
     h, w, pitch = signal.sizes
     rows, share = run.grid(3, h, w), run.grid(1, h, w)
     sizes = h, pitch, run.numbers.sigma
-    arguments = (*sizes, coarse.features.planes, signal.planes, rows.planes)
-    run.launch("share_rows", "merge.cl", signal, arguments, COUNT=0, **options)
-    arguments = (
-        *sizes, run.numbers.caution, coarse.features.planes, rows.planes, share.planes
-    )  # fmt: skip
-    run.launch("share_columns", "merge.cl", signal, arguments, COUNT=0, **options)
+    along_rows = *sizes, coarse.features.planes, signal.planes, rows.planes
+    run.launch("share_rows", "merge.cl", signal, along_rows, COUNT=0, **options)
+    down = *sizes, run.numbers.caution, coarse.features.planes, rows.planes, share.planes
+    run.launch("share_columns", "merge.cl", signal, down, COUNT=0, **options)
     return share
 
 
@@ -34,7 +32,7 @@ def _signal(run: Run, fine: Level, coarse: Level, options: dict[str, int]) -> Gr
         h, pitch, *coarse.models.sizes, run.numbers.guide_scale, run.mean, fine.moments.planes,
         fine.features.planes, fine.models.planes, coarse.models.planes, signal.planes,
     )  # fmt: skip
-    run.launch("signal", "merge.cl", signal, arguments, COUNT=fine.moments.count, **options)
+    run.launch("signal", "merge.cl", signal, arguments, COUNT=fine.moments.number, **options)
     return signal
 
 

@@ -9,7 +9,7 @@ from jflnr.opencl.grids import GROUP, Grid, Run
 
 def halve(run: Run, grid: Grid) -> Grid:
     """Mean of 2 x 2 blocks, zeros beyond the border."""
-    (h, pitch), count = grid.size, grid.count
+    (h, pitch), count = grid.size, grid.number
     strides = pitch * count, GROUP * count, GROUP
     return _halve(
         run, grid.planes, (h, pitch), strides, run.grid(count, -(-h // 2), -(-grid.w // 2))
@@ -27,6 +27,6 @@ def _halve(
     run: Run, planes: Any, size: tuple[int, int], strides: tuple[int, int, int], halves: Grid
 ) -> Grid:
     """strides: from one row, group of neighbours and plane to the next."""
-    arguments = (halves.count, *size, *strides, *halves.size, planes, halves.planes)
+    arguments = (halves.number, *size, *strides, *halves.size, planes, halves.planes)
     run.launch("halve", "pyramid.cl", halves, arguments)
     return halves
