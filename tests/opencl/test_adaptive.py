@@ -57,6 +57,16 @@ def test_weights_and_spoiled_pixels(context: Context, kind: str) -> None:
     assert compare(context, target, guides, weight) < tolerances.ADAPTIVE
 
 
+def test_exponent_of_one(context: Context) -> None:
+    """It is built without the power, and must be where the others end."""
+    target, guides = scene(*SIZE, 5, 3)
+    found, right = (
+        flr_adaptive(target, guides, PARAMETERS.but(exponent=exponent), context=context)
+        for exponent in (1.0, 1.000001)
+    )
+    assert error(found, right) < tolerances.ADAPTIVE
+
+
 def test_no_light(context: Context) -> None:
     target, guides = scene(*SIZE, 5, 3)
     assert not flr_adaptive(np.zeros_like(target), guides, PARAMETERS, context=context).any()

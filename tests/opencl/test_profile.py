@@ -9,7 +9,10 @@ import pytest
 
 import jflnr
 from jflnr.cli import main
-from jflnr.opencl import Context, flr
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.noisy_guides import smooth_guide
+from jflnr.guides import DEFAULT, layers
+from jflnr.opencl import Context, flr, flr_adaptive
 from jflnr.opencl.profile import profile
 from tests.opencl import tolerances
 from tests.opencl.conftest import PARAMETERS, error, scene
@@ -58,8 +61,25 @@ def test_denoise_backend(
     assert "blur_columns" in capsys.readouterr().out
     assert main([*command, "--profile", "--overwrite"]) == 2
     assert "--backend opencl" in capsys.readouterr().err
-    for method, tolerance in (("flr", tolerances.WHOLE), ("flr-adaptive", tolerances.ADAPTIVE)):
-        by_jax, by_opencl = (
-            np.asarray(jflnr.denoise(frame, method, backend=name)) for name in ("jax", "opencl")
+    by_jax, by_opencl = (
+        np.asarray(jflnr.denoise(frame, backend=name)) for name in ("jax", "opencl")
+    )
+    assert error(by_opencl, by_jax) < tolerances.WHOLE
+
+
+def test_denoise_adaptive_backend(context: Context, frame: jflnr.Frame) -> None:
+    """What `denoise` hands to the kernels: smooth occlusion, the mask, and the option."""
+    normal, depth, ao = layers(frame, DEFAULT)
+    smooth = np.asarray(smooth_guide(ao, frame.normal, frame.depth))
+    weight = None if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
+    for keep_energy in (False, True):
+        right = flr_adaptive(
+            frame.indirect,
+            (normal, depth, smooth),
+            ADAPTIVE_DEFAULT,
+            weight=weight,
+            keep_energy=keep_energy,
+            context=context,
         )
-        assert error(by_opencl, by_jax) < tolerance
+        found = jflnr.denoise(frame, "flr-adaptive", backend="opencl", keep_energy=keep_energy)
+        assert error(np.asarray(found), right) < tolerances.ADAPTIVE
