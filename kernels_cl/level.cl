@@ -16,7 +16,7 @@
 // Eight sums at a time stay in registers while the taps go by.
 #define TOGETHER 8
 
-// sums: of `count` planes, at most that many, over the column. rows: the first of them at the block.
+// sums: of the first `count` planes, no more than TOGETHER, over the column. rows: plane 0 at the block.
 // moved: how far away each tap's row lies.
 INLINE void along_column(
     global const float *rows, const long *moved, const real *weights, int count, real *sums)
