@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jflnr import checks
+from jflnr import checks, flnr
 from jflnr import guides as guide_layers
 from jflnr.flr.adaptive import flr_adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
@@ -25,7 +25,7 @@ from jflnr.frame import Array, Frame
 
 # Pixels on a side that share one model: the size the paper found to lose nothing.
 BLOCK = 8
-METHODS = ("flr", "flr-adaptive")
+METHODS = ("flr", "flr-adaptive", *flnr.METHODS)
 SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 BACKENDS = ("jax", "opencl")
 
@@ -36,7 +36,7 @@ def denoise(
     *,
     backend: str = "jax",
     guides: Sequence[str] | None = None,
-    parameters: Parameters | AdaptiveParameters | None = None,
+    parameters: Parameters | AdaptiveParameters | dict[str, Any] | None = None,
     block: int = BLOCK,
     keep_energy: bool = False,
     tile: int | None = None,
@@ -46,11 +46,13 @@ def denoise(
     frame: as from `read_frame`. Its `indirect` may have any number of channels C: several light
     groups side by side are denoised together, and their results sum to the denoised sum. It may
     also be smaller than the other layers by a whole factor; the result then has their size.
-    method: `flr` (section 3.2 of the paper) or `flr-adaptive` (docs/adaptive.md).
+    method: `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md) or `flnr`, the same
+    steered by a small network (docs/flnr.md).
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
-    the frame has it, ao. parameters: of the method; the fitted defaults if None.
+    the frame has it, ao. parameters: of the method, for flnr weights from `flnr.weights.load`; the
+    fitted defaults if None.
     block: pixels on a side that share one model.
-    keep_energy: for `flr-adaptive`, keep the mean radiance exactly instead of nearly.
+    keep_energy: except for `flr`, keep the mean radiance exactly instead of nearly.
     tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
     (docs/large.md); on all of them if None.
     Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
@@ -63,6 +65,15 @@ def denoise(
     checks.choice("backend", backend, BACKENDS)
     checks.positive_integer("block", block)
     names, inputs = prepare(frame, guides)
+    if method in flnr.METHODS:
+        if backend != "jax" or block != BLOCK or tile is not None:
+            raise ValueError(
+                f"method {method} runs on the jax backend, in one piece, with block {BLOCK}"
+            )
+        from jflnr.flnr.method import denoise_flnr
+
+        own = _parameters(parameters, None if parameters is None else {})
+        return denoise_flnr(inputs, method, own, names=names, keep_energy=keep_energy)
     if method == "flr-adaptive":
         settings = _parameters(parameters, ADAPTIVE_DEFAULT)
         if backend != "jax" and tile is not None:

@@ -122,7 +122,7 @@ def test_wrong_input_is_named(frame, layers, options, words):
 
 def test_the_adaptive_method_is_better_on_the_shipped_frame():
     frame = jflnr.read_frame(denoising.SHIPPED_FRAME)
-    plain, adaptive = (psnr(frame, jflnr.denoise(frame, method)) for method in jflnr.METHODS)
+    plain, adaptive = (psnr(frame, jflnr.denoise(frame, m)) for m in ("flr", "flr-adaptive"))
     assert adaptive > plain + 0.5
 
 

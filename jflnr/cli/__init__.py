@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import completion, denoise, devices, fit, info, metrics, report
+from jflnr.cli import completion, denoise, devices, fit, info, metrics, report, train
 from jflnr.cli.common import INPUT_ERRORS, sentence, tinted
 
 EXAMPLES = """\
@@ -26,6 +26,7 @@ COMMANDS = {
     "metrics": metrics,
     "report": report,
     "fit": fit,
+    "train": train,
     "devices": devices,
     "completion": completion,
 }

@@ -35,14 +35,18 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
 def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
     """As `_settings`, for methods that have no sigma, eps and eps' to set."""
     from jflnr.denoising import BLOCK
+    from jflnr.flnr import METHODS, weights
 
-    for name in ("params", "sigma", "eps", "eps_prime"):
+    network = arguments.method in METHODS
+    for name in ("sigma", "eps", "eps_prime", *(() if network else ("params",))):
         if getattr(arguments, name) is not None:
             option = name.replace("_", "-")
             raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
+    own = None if arguments.params is None else weights.load(arguments.params)[0]
     return {
         "method": arguments.method,
         "backend": arguments.backend,
+        "parameters": own,
         "guides": arguments.guides,
         "block": BLOCK if arguments.block is None else arguments.block,
     }

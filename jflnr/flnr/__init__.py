@@ -1,3 +1,3 @@
 """FLNR: adaptive FLR steered by a small network (section 3.3 of the paper)."""
 
-METHODS = ("flnr-tiny", "flnr-small", "flnr")
+METHODS = ("flnr",)

@@ -1,4 +1,4 @@
-"""The methods flnr-tiny, flnr-small and flnr of `jflnr.denoise`."""
+"""The method flnr of `jflnr.denoise`."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Settings:
     between validations. noisy_targets: whether targets have noise of their own.
     """
 
-    widths: tuple[int, ...] = CONFIGS["base"]
+    widths: tuple[int, ...] = CONFIGS["tiny"]
     seed: int = 0
     batch: int = 4
     rate: float = 1e-3

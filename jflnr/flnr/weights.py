@@ -60,7 +60,7 @@ def load(path: str | Path) -> tuple[unet.Params, dict[str, Any]]:
 
 @functools.cache
 def shipped(method: str) -> unet.Params:
-    """The weights that come with the package: `flnr-tiny`, `flnr-small` or `flnr`."""
+    """The weights that come with the package."""
     return load(FOLDER / f"{method}.npz")[0]
 
 

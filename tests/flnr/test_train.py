@@ -13,7 +13,7 @@ import pytest
 from jflnr.flnr import examples as reading
 from jflnr.flnr import loss, regression, train
 from jflnr.flnr.adam import Adam
-from jflnr.flnr.augment import augment
+from jflnr.flnr.augment import _mirror, augment
 from tests.flnr.conftest import WIDTHS, as_jax
 
 
@@ -62,18 +62,14 @@ def test_augmenting_shows_the_same_scene(examples):
 
 def test_augmented_inputs_are_those_of_the_mirrored_frame(scene, examples):
     """What the network reads of a mirrored example is the example's of the mirrored frame."""
-    mirror = jnp.asarray(True)
-    from jflnr.flnr.augment import _mirror
-
-    def known(flip):
-        target, guides = (a[:32, :48] for a in scene)
-        return regression.prepare(flip(target), flip(guides), None)[0]
-
-    flip = lambda a: np.ascontiguousarray(a[:, ::-1])
-    example = as_jax(examples[0])._replace(prepared=known(lambda a: a))
-    ours, wanted = _mirror(example, 1, mirror).prepared, known(flip)
-    for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(wanted), strict=True):
-        np.testing.assert_allclose(mine, other, rtol=0.02, atol=0.02 * np.abs(other).max())
+    prepare = jax.jit(lambda target, guides: regression.prepare(target, guides, None)[0])
+    target, guides = (a[:32, :32] for a in scene)
+    mirrored = prepare(target[:, ::-1], guides[:, ::-1])
+    example = as_jax(examples[0])._replace(prepared=prepare(target, guides))
+    ours = _mirror(example, 1, jnp.asarray(True)).prepared
+    # The guides' shift is taken from other pixels, which rounding shows.
+    for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(mirrored), strict=True):
+        np.testing.assert_allclose(mine, other, rtol=1e-2, atol=1e-2 * np.abs(other).max())
 
 
 def test_going_on_gives_the_same_weights(examples, settings, tmp_path):
