@@ -58,7 +58,7 @@ def _finer_by(target: Any, guides: Any, guides_map: Any) -> int:
     return factor
 
 
-def times_finer(fine: tuple[int, int], coarse: tuple[int, int]) -> int | None:
+def times_finer(fine: tuple[int, ...], coarse: tuple[int, ...]) -> int | None:
     """The smallest f with `coarse = ceil(fine / f)` in both directions; None if there is none."""
     first = max(-(-f // c) for f, c in zip(fine, coarse, strict=True))
     for factor in range(first, max(fine) + 1):
