@@ -24,6 +24,7 @@ NAMES = (
     "regularisation",
     "block",
     "guide_choice",
+    "flnr",
     "upsample",
     "lightgroups",
     "figure9",
