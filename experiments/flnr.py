@@ -95,4 +95,4 @@ def _crops(frame: Frame) -> np.ndarray:
     y, x = np.unravel_index(np.argmax(blocks.sum((1, 3))), (rows, columns))
     part = np.s_[y * CROP : (y + 1) * CROP, x * CROP : (x + 1) * CROP]
     panels = [shown[name][part] for name in SHOWN if name in shown]
-    return np.uint8(255 * np.concatenate(panels, axis=1) + 0.5)
+    return (255 * np.concatenate(panels, axis=1) + 0.5).astype(np.uint8)

@@ -57,9 +57,11 @@ def _mirror(example: Example, axis: int, mirrored: jax.Array) -> Example:
 
     example = _with_planes(example, planes, image)
     known = example.prepared
-    mirror = jax.tree.map(planes, known._replace(x=None, mean=None))
+    coarsest, differences, shares, factor = jax.tree.map(planes, known[1:-1])
     return example._replace(
-        prepared=mirror._replace(x=known.x, mean=known.mean),
+        prepared=known._replace(
+            coarsest=coarsest, differences=differences, shares=shares, factor=factor
+        ),
         guides=image(example.guides),
         albedo=image(example.albedo),
         target=image(example.target),

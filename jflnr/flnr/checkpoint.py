@@ -15,7 +15,9 @@ from jflnr.files import replacing
 def save_state(path: Path, state: Any, history: list, run: dict[str, Any]) -> None:
     """Write the leaves of `state`, the history and what identifies the run, atomically."""
     header = json.dumps({"run": run, "history": history}).encode()
-    leaves = {f"leaf{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
+    leaves: dict[str, Any] = {
+        f"leaf{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))
+    }
     with replacing(path) as beside, beside.open("wb") as file:
         np.savez(file, header=np.frombuffer(header, np.uint8), **leaves)
 

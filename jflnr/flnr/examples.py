@@ -8,7 +8,7 @@ import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -41,12 +41,12 @@ class Example(NamedTuple):
     """
 
     prepared: Prepared
-    shift: np.ndarray
-    guides: np.ndarray
-    albedo: np.ndarray
-    target: np.ndarray
-    exposure: np.ndarray
-    share: np.ndarray
+    shift: Any
+    guides: Any
+    albedo: Any
+    target: Any
+    exposure: Any
+    share: Any
 
 
 def read(paths: Sequence[Path], seed: int) -> Iterator[list[Example]]:
@@ -72,7 +72,9 @@ def realisations(path: Path, random: np.random.Generator) -> list[tuple[int, Fra
     noisy = {m[0][:-2]: int(m[1]) for name in sorted(channels) if (m := NOISY.fullmatch(name))}
     noisy = {name: spp for name, spp in noisy.items() if spp in SHARES}
     if not noisy:
-        raise ValueError(f"{path}: no noisy layer indirect_N with N one of {', '.join(SHARES)}")
+        raise ValueError(
+            f"{path}: no noisy layer indirect_N with N one of {', '.join(map(str, SHARES))}"
+        )
     frame = read_frame(path, next(iter(noisy.values())))
     light = {n: np.stack([channels[f"{n}.{c}"] for c in "RGB"], axis=-1) for n in noisy}
     light = {name: image.astype(np.float32) for name, image in light.items()}

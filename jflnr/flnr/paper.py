@@ -7,6 +7,7 @@ X_model, and evaluated on the second, X_map.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -61,7 +62,7 @@ def flnr_of_paper(
     parameters: Parameters,
     *,
     weight: jax.Array | None = None,
-    **options: int,
+    **options: Any,
 ) -> jax.Array:
     """Denoise with the network's guides. Scales with `target`.
 

@@ -42,11 +42,10 @@ def init(key: jax.Array, inputs: int, widths: Sequence[int], heads: Sequence[int
     return params
 
 
-def apply(params: Params, x: jax.Array) -> list[jax.Array | None]:
+def apply(params: Params, x: jax.Array) -> list[jax.Array]:
     """The outputs of every scale.
 
-    x: `(h, w, inputs)`, any size. Returns `(ceil(h / 2^i), ceil(w / 2^i), heads[i])` or None for
-    scale i.
+    x: `(h, w, inputs)`, any size. Returns `(ceil(h / 2^i), ceil(w / 2^i), heads[i])` for scale i.
     """
     scales = sum(name.startswith("encode") and name[-1].isdigit() for name in params)
     x = _layer(params, "stem", x)
@@ -101,7 +100,7 @@ def _layer(params: Params, name: str, x: jax.Array, stride: int = 1) -> jax.Arra
     return jax.nn.leaky_relu(convolve(x, params[name], params[f"{name}_bias"], stride), 0.1)
 
 
-def _head(params: Params, scale: int, x: jax.Array) -> jax.Array | None:
+def _head(params: Params, scale: int, x: jax.Array) -> jax.Array:
     if f"head{scale}" not in params:
-        return None
+        return x[..., :0]
     return convolve(x, params[f"head{scale}"], params[f"head{scale}_bias"])

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jflnr.files import replacing
@@ -35,7 +36,7 @@ def save(path: str | Path, params: unet.Params, widths: tuple[int, ...], **about
         **about,
     }
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    arrays = {name: np.asarray(value, np.float16) for name, value in params.items()}
+    arrays: dict[str, Any] = {name: np.asarray(value, np.float16) for name, value in params.items()}
     with replacing(path) as beside, beside.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
 
@@ -55,7 +56,7 @@ def load(path: str | Path) -> tuple[unet.Params, dict[str, Any]]:
     for name, array in arrays.items():
         if array.dtype != np.float16 or not np.isfinite(array).all():
             raise ValueError(f"{path}: array {name} must hold finite half-precision numbers")
-    return {name: array.astype(np.float32) for name, array in arrays.items()}, header
+    return {name: jnp.asarray(array, jnp.float32) for name, array in arrays.items()}, header
 
 
 @functools.cache
