@@ -61,7 +61,8 @@ class _Parser(argparse.ArgumentParser):
     """An ArgumentParser that answers a wrong command line with one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        line = " ".join(message.split())
+        self.exit(2, f"{self.prog}: {line} (see {self.prog} --help)\n")
 
 
 def parser() -> argparse.ArgumentParser:

@@ -58,6 +58,10 @@ def test_any_command_line(folder, capsys, line):
     answers(folder, capsys, line)
 
 
+def test_an_argument_of_many_lines(folder, capsys):
+    answers(folder, capsys, ["info", "frame.exr", "--none", "a\nb\vc\u2028d\n\ne"])
+
+
 @pytest.mark.slow
 @long(max_examples=5000, suppress_health_check=reuse)
 @given(line=LINES)
