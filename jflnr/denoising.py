@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jflnr import checks, flnr
 from jflnr import guides as guide_layers
 from jflnr.flr.adaptive import flr_adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
-from jflnr.flr.arguments import times_finer
-from jflnr.flr.noisy_guides import smooth_guide
 from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.regression import flr
 from jflnr.frame import Array, Frame
+from jflnr.inputs import adaptive_images, coarse_block, factor_of, flr_images, prepare
 
 # Pixels on a side that share one model: the size the paper found to lose nothing.
 BLOCK = 8
@@ -95,22 +91,6 @@ def denoise(
     return np.concatenate([strip for _, strip in strips.denoise(rows, options, tile)])
 
 
-def prepare(frame: Frame, guides: Sequence[str] | None) -> tuple[tuple[str, ...], Frame]:
-    """Names of the guides to use, and the checked layers that denoising reads."""
-    names = guide_layers.choose(frame, guides)
-    inputs = frame_inputs(frame, names)
-    _check_sizes(inputs)
-    if guides is None and frame.ao is None:
-        warnings.warn(
-            "The frame has no ao layer, so the guides are normal and depth only; "
-            "shadows cast by indirect light may be lost.",
-            stacklevel=3,
-        )
-    if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
-        raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
-    return names, inputs
-
-
 class Part(NamedTuple):
     """What a part of a frame takes from the whole: how far its windows reach, and what `layers` and
     `flr` would else find for themselves."""
@@ -132,16 +112,15 @@ def denoise_flr(
     if part is None:
         height, width = frame.normal.shape[:2]
         part = Part(support_of(parameters, max(height, width)))
-        if (height % block or width % block) and _factor(frame) == 1 and _is_numpy(frame):
+        if (height % block or width % block) and factor_of(frame) == 1 and _is_numpy(frame):
             # Sizes that differ by less than a block share a program. NaN counts for nothing.
             part, padded = part._replace(scene=guide_layers.scene_of(frame)), _pad(frame, block)
             return denoise_flr(padded, parameters, names, block, backend, part)[:height, :width]
     if backend == "opencl":
         from jflnr import opencl
 
-        images, coarse_block = _images(frame, names, part.scene), _coarse_block(frame, block)
-        support = part.support
-        return opencl.flr(parameters=parameters, block=coarse_block, support=support, **images)
+        images, block = flr_images(frame, names, part.scene), coarse_block(frame, block)
+        return opencl.flr(parameters=parameters, block=block, support=part.support, **images)
     return _denoise(frame, parameters, names, block, *part)
 
 
@@ -168,28 +147,6 @@ def _parameters(given: Any, default: Any) -> Any:
     return default if given is None else given
 
 
-def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
-    """The frame reduced to the layers that denoising reads, so that others cost nothing."""
-    needed = {"indirect", "normal", "depth", "mask", *names}
-    unused = {field.name: None for field in dataclasses.fields(Frame) if field.name not in needed}
-    return dataclasses.replace(frame, **unused)  # type: ignore[arg-type]
-
-
-def _check_sizes(frame: Frame) -> None:
-    layers = {name: layer for name, layer in vars(frame).items() if name != "indirect"}
-    for name, layer in layers.items():
-        if layer is not None or name in ("normal", "depth"):
-            checks.image(name, layer, 1 if name in ("depth", "ao", "mask") else 3)
-    checks.same_size(**layers)
-    checks.image("indirect", frame.indirect)
-    (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]
-    if times_finer((height, width), (h, w)) is None:
-        raise ValueError(
-            f"frame.indirect is {w} x {h} pixels and the guides are {width} x {height}; "
-            "they must be the same, or the guides a whole number of times larger"
-        )
-
-
 def support_of(parameters: Parameters, longest: int) -> int:
     """Three standard deviations, in steps of 24 pixels so that few programs are compiled.
 
@@ -199,51 +156,6 @@ def support_of(parameters: Parameters, longest: int) -> int:
         return 72
     reach = min(float(parameters.sigma) * 3, longest)
     return 24 * max(int(np.ceil(reach / 24)), 1)
-
-
-def _coarse_block(frame: Frame, block: int) -> int:
-    """The block in pixels of `frame.indirect`, which may be coarser than the guides."""
-    return max(block // _factor(frame), 1)
-
-
-def _factor(frame: Frame) -> int:
-    """How many times larger the guides are than the light."""
-    return times_finer(frame.normal.shape[:2], frame.indirect.shape[:2]) or 1
-
-
-def _images(
-    frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene | None = None
-) -> dict[str, Any]:
-    """The images that `flr` takes, from the layers of the frame; numpy's stay where they are."""
-    target, mask = frame.indirect, frame.mask
-    layers = guide_layers.layers(frame, names, scene)
-    factor = _factor(frame)
-    if factor == 1:
-        weight = None if mask is None else mask[..., 0] > 0
-        return {"target": target, "guides": layers, "weight": weight}
-    return {
-        "target": target,
-        "guides": tuple(guide_layers.shrink(layer, factor, mask) for layer in layers),
-        "guides_map": layers,
-        "weight": None if mask is None else guide_layers.shrink(mask, factor)[..., 0],
-    }
-
-
-def adaptive_images(
-    frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene | None = None
-) -> dict[str, Any]:
-    """The images that `flr_adaptive` takes, ambient occlusion without its noise.
-
-    scene: of the frame that this one is a part of; the frame's own if None.
-    """
-    images = _images(frame, names, scene)
-    if "ao" in names:
-        ao = names.index("ao")
-        normal, depth = jnp.asarray(frame.normal), jnp.asarray(frame.depth)
-        layers = list(images["guides"])
-        layers[ao] = smooth_guide(layers[ao], normal, depth)
-        images["guides"] = tuple(layers)
-    return images
 
 
 @functools.partial(jax.jit, static_argnames=("names", "block", "support"))
@@ -256,7 +168,7 @@ def _denoise(
     scene: guide_layers.Scene | None,
     shift: jax.Array | None,
 ) -> jax.Array:
-    images, block = _images(frame, names, scene), _coarse_block(frame, block)
+    images, block = flr_images(frame, names, scene), coarse_block(frame, block)
     return flr(parameters=parameters, block=block, support=support, shift=shift, **images)
 
 
@@ -281,12 +193,7 @@ def _denoise_adaptive_opencl(
 ) -> np.ndarray:
     from jflnr import opencl
 
-    images = _images(frame, names)
-    if "ao" in names:
-        layers = list(images["guides"])
-        ao = names.index("ao")
-        layers[ao] = opencl.smooth_guide(layers[ao], frame.normal, frame.depth)
-        images["guides"] = tuple(layers)
+    images = adaptive_images(frame, names, smooth=opencl.smooth_guide)
     return opencl.flr_adaptive(
         parameters=parameters, block=block, keep_energy=keep_energy, **images
     )

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import jax
 
-from jflnr.denoising import adaptive_images, prepare
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
 from jflnr.flr.uncertainty import flr_adaptive_with_error
 from jflnr.frame import Array, Frame
+from jflnr.inputs import adaptive_images, prepare
 
 
 def denoise_with_error(

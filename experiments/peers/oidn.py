@@ -66,4 +66,10 @@ def denoise(
     frame: Frame, *, quality: str = "high", clean: bool = False, modulated: bool = False
 ) -> np.ndarray:
     """OIDN once, `(H, W, 3)` demodulated; see `filter_for`."""
-    return filter_for(frame, quality=quality, clean=clean, modulated=modulated)().copy()
+    call = filter_for(frame, quality=quality, clean=clean, modulated=modulated)
+    image = call().copy()
+    # Python does not free them, and each holds a network.
+    device, network, _ = call.owners  # type: ignore[attr-defined]
+    network.release()
+    device.release()
+    return image

@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr import exr
-from jflnr.denoising import adaptive_images, frame_inputs
 from jflnr.flnr import features
 from jflnr.flnr.regression import Prepared, prepare
 from jflnr.frame import Frame, read_frame
+from jflnr.inputs import adaptive_images, frame_inputs
 from jflnr.metrics import MEAN_BRIGHTNESS
 
 # Sides of a crop: whole blocks on the coarsest grid, so that flipping a crop flips all grids.

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr.flnr import unet
-from jflnr.flr.adaptive import Step
 from jflnr.flr.level import Grid, brightness, mean_guides, predict
 from jflnr.flr.moments import index_xx, index_xy
 from jflnr.flr.pyramid import double, halve
+from jflnr.flr.widths import Step
 
 # The guides that the features are made of: normal (3), depth, ambient occlusion.
 GUIDES = ("normal", "depth", "ao")

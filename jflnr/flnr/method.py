@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import jax
 
-from jflnr.denoising import adaptive_images
 from jflnr.flnr import features, regression, unet, weights
 from jflnr.flr.adaptive import light_of
 from jflnr.flr.energy import rescale
 from jflnr.frame import Array, Frame
+from jflnr.inputs import adaptive_images
 
 
 def denoise_flnr(

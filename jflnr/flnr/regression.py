@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 
 from jflnr.flnr import features, unet
-from jflnr.flr import adaptive
+from jflnr.flr import adaptive, widths
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.apply import apply, with_borders
 from jflnr.flr.arguments import check_regression
@@ -85,7 +85,7 @@ def prepare(
     models = adaptive.fit_pilot(moments, mean, shift, numbers, BLOCK)
     pilot = adaptive.Pilot(with_borders(models), mean)
     grid = adaptive.collect_grid(target, guides, shift, pilot, weight, numbers, BLOCK)
-    coarsest, steps = adaptive.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
+    coarsest, steps = widths.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
     frame = Prepared(
         x=features.of_steps(steps, shift.size, mean),
         coarsest=coarsest.coefficients,

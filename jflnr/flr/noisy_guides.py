@@ -15,6 +15,7 @@ def smooth_guide(guide: jax.Array, normal: jax.Array, depth: jax.Array) -> jax.A
     The fit would copy the noise of a guide into the picture. guide: `(H, W, Q)`. normal:
     `(H, W, 3)`. depth: `(H, W, 1)`. Returns `(H, W, Q)`.
     """
+    normal, depth = jnp.asarray(normal), jnp.asarray(depth)
     for axis in (1, 0):
         guide = _smooth(guide, normal, depth, axis)
     return guide

@@ -9,13 +9,13 @@ import jax
 import jax.numpy as jnp
 
 from jflnr import guides as guide_layers
-from jflnr.denoising import adaptive_images
-from jflnr.flr import adaptive, energy
+from jflnr.flr import adaptive, energy, widths
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.apply import apply_rows
 from jflnr.flr.level import Grid
 from jflnr.flr.moments import Guides
 from jflnr.frame import Frame
+from jflnr.inputs import adaptive_images
 
 _on_pixels = functools.partial(jax.jit, static_argnames=("names", "block"))
 _on_blocks = functools.partial(jax.jit, static_argnames=("channels", "block"))
@@ -82,9 +82,7 @@ def models_of_tile(
     """Models of the finest blocks `(Q + 1, C, h, w)`, and the brightness `(h/2, w/2)` they give."""
     grid = Grid(moments[:-1], moments[-1:], block)
     guides = common.shift.size
-    models = adaptive.fit_pyramid(
-        grid, common.shift, channels, adaptive.LEVELS, mean, common.numbers
-    )
+    models = widths.fit_pyramid(grid, common.shift, channels, adaptive.LEVELS, mean, common.numbers)
     return models, energy.block_light(models, light, guides)
 
 

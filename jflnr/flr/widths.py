@@ -1,0 +1,97 @@
+"""Widths from the data: a fit on every grid, and of each finer one as much as is signal."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
+from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict
+from jflnr.flr.merge import interpolate, signal_share
+from jflnr.flr.pyramid import double, halve
+
+
+class Step(NamedTuple):
+    """One level finer than what was known before.
+
+    fine: its fit. coarse: that of the coarser level, on this grid. level: `(h, w)`, brightness
+    known before. share: `(h, w)`, how much of their difference is signal. merged: models
+    `(Q + 1, C, h, w)` with that share added.
+    """
+
+    grid: Grid
+    fine: Fit
+    coarse: Fit
+    level: jax.Array
+    share: jax.Array
+    merged: jax.Array
+
+
+def fit_pyramid(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    levels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+) -> jax.Array:
+    """Models of the finest grid, put together from all levels. Returns `(Q + 1, C, h, w)`."""
+    coarsest, steps = fit_levels(grid, shift, channels, levels, mean, numbers)
+    return steps[-1].merged if steps else coarsest.coefficients
+
+
+def fit_levels(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    levels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+) -> tuple[Fit, list[Step]]:
+    """The fit of the coarsest grid, and the steps from there to the finest."""
+    grids = [grid]
+    for _ in range(levels - 1):
+        last = grids[-1]
+        grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+    features = guide_features(grids[-1], shift.size, numbers)
+    coarsest = coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
+    merged, steps = coarse.coefficients, list[Step]()
+    for grid in reversed(grids[:-1]):
+        # Windows of the finest blocks are so narrow that slopes across them are hardly worth
+        # their time.
+        slopes = grid is not grids[0]
+        steps.append(_refine(grid, coarse, merged, shift, channels, mean, numbers, slopes))
+        coarse, merged = steps[-1].fine, steps[-1].merged
+    return coarsest, steps
+
+
+def _refine(
+    grid: Grid,
+    coarse: Fit,
+    merged: jax.Array,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+    slopes: bool,
+) -> Step:
+    """One level finer: its own fit, and what is merged so far with its share added."""
+    size = grid.moments.shape[1:]
+    window = coarse.window
+    coarse, merged = interpolate(coarse, *size), double(merged, *size)
+    level = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
+    # Windows end where what is known so far of the brightness changes.
+    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
+    features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
+    fine = fit_level(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    reference = level**2 + 0.01 * mean**2
+    share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
+    merged = merged + share * (fine.coefficients - coarse.coefficients)
+    return Step(grid, fine, coarse, level, share, merged)
+
+
+def guide_features(grid: Grid, guides: int, numbers: AdaptiveParameters) -> jax.Array:
+    """What of the guides must be alike inside a window, `(Q, h, w)`."""
+    return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
