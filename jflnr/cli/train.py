@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 
 UNITS = {"s": 1, "m": 60, "h": 3600}
 
+EXAMPLES = """\
+  jflnr train --data frames/ --val kept/ -o weights.npz --time 3h
+  jflnr denoise shot/ -o clean/ --method flnr --params weights.npz
+"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
