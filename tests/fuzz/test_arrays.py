@@ -20,7 +20,7 @@ long = functools.partial(
     settings, deadline=None, database=None, suppress_health_check=list(HealthCheck)
 )
 
-TYPES = st.sampled_from("e f d g b B i q ? F O U1 M8[s]".split())
+TYPES = st.sampled_from("e f d b B i q ? F O U1 M8[s]".split())
 SHAPES = st.one_of(
     st.lists(st.sampled_from([0, 1, 2, 3, 8]), max_size=4).map(tuple),
     st.sampled_from([(8, 9, 2), (8, 9, 3), (8, 9, 0), (16, 18, 2), (7, 9, 2), (8, 9)]),
