@@ -10,7 +10,7 @@ from PIL import Image
 
 from experiments import data, plots, results, resume
 from experiments.methods import Method, basic, oidn_peers, ours
-from experiments.table1 import mean_of, per_frame
+from experiments.table1 import PICTURE, mean_of, per_frame
 from experiments.timing import times
 from jflnr import denoise
 from jflnr.frame import Frame
@@ -19,16 +19,7 @@ from jflnr.metrics import display, exposure, measure
 NAME = "flnr"
 QUESTION = "What does the network add, frame by frame, and what does it cost?"
 
-COLUMNS = {
-    "method": "method",
-    "psnr": "PSNR, dB",
-    "ssim": "SSIM",
-    "flip": "FLIP",
-    "rmse": "rMSE",
-    "smape": "SMAPE",
-    "energy": "energy",
-    "ms": "ms, 640 x 360",
-}
+COLUMNS = PICTURE | {"energy": "energy", "ms": "ms, 640 x 360"}
 SHOWN = ("noisy", "OIDN, tuned", "flr-adaptive", "flnr", "reference")
 CROP = 160
 

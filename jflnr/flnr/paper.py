@@ -12,7 +12,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jflnr.flnr.unet import Params, convolve, upsample
+from jflnr.flnr.unet import Params, convolve, layers, upsample
 from jflnr.flr.parameters import Parameters
 from jflnr.flr.regression import flr
 
@@ -27,13 +27,7 @@ def init(key: jax.Array, inputs: int, guides: int, widths: Sequence[int] = (16, 
         shapes[f"decode{i}a"] = (3, 3, widths[i] + widths[i + 1], widths[i])
         shapes[f"decode{i}b"] = (3, 3, widths[i], widths[i])
     shapes |= {"out3": (3, 3, first, first), "out1": (1, 1, first, 2 * guides)}
-    params = {}
-    for name, shape in shapes.items():
-        key, own = jax.random.split(key)
-        deviation = (2 / (shape[0] * shape[1] * shape[2])) ** 0.5
-        params[name] = deviation * jax.random.normal(own, shape)
-        params[f"{name}_bias"] = jnp.zeros(shape[-1])
-    return params
+    return layers(key, shapes)
 
 
 def apply(params: Params, x: jax.Array) -> tuple[jax.Array, jax.Array]:

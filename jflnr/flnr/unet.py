@@ -6,7 +6,7 @@ is 1x1: its input is a few finer blocks side by side, so that no convolution run
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import jax
@@ -29,16 +29,22 @@ def init(key: jax.Array, inputs: int, widths: Sequence[int], heads: Sequence[int
             shapes[f"down{i}"] = (3, 3, width, widths[i + 1])
             shapes[f"join{i}"] = (3, 3, width + widths[i + 1], width)
             shapes[f"decode{i}"] = (3, 3, width, width)
+    params = layers(key, shapes)
+    for i, outputs in enumerate(heads):
+        if outputs:
+            params[f"head{i}"] = jnp.zeros((1, 1, widths[i], outputs))
+            params[f"head{i}_bias"] = jnp.zeros(outputs)
+    return params
+
+
+def layers(key: jax.Array, shapes: Mapping[str, tuple[int, ...]]) -> Params:
+    """Random convolutions that keep the variance (He et al. 2015), and biases of 0."""
     params = {}
     for name, shape in shapes.items():
         key, own = jax.random.split(key)
         deviation = (2 / (shape[0] * shape[1] * shape[2])) ** 0.5
         params[name] = deviation * jax.random.normal(own, shape)
         params[f"{name}_bias"] = jnp.zeros(shape[-1])
-    for i, outputs in enumerate(heads):
-        if outputs:
-            params[f"head{i}"] = jnp.zeros((1, 1, widths[i], outputs))
-            params[f"head{i}_bias"] = jnp.zeros(outputs)
     return params
 
 

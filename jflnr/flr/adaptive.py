@@ -23,7 +23,7 @@ from jflnr.flr.level import Fit, Grid, brightness, fit_level
 from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude
 from jflnr.flr.pyramid import halve
 from jflnr.flr.weighted_moments import collect_weighted
-from jflnr.flr.widths import Step, fit_levels, guide_features
+from jflnr.flr.widths import Step, fit_levels, guide_features, merged_models
 
 BLOCK = 8
 LEVELS = 4
@@ -108,8 +108,7 @@ def fit_frame(
     pilot = Pilot(with_borders(fit_pilot(moments, mean, shift, numbers, block)), mean)
     grid = collect_grid(target, guides, shift, pilot, weight, numbers, block)
     coarsest, steps = fit_levels(grid, shift, target.shape[-1], levels, mean, numbers)
-    merged = steps[-1].merged if steps else coarsest.coefficients
-    coefficients = restore(merged, moments, shift.size, numbers.slack)
+    coefficients = restore(merged_models(coarsest, steps), moments, shift.size, numbers.slack)
     return Fitted(coefficients, coarsest, steps, shift, mean, unit)
 
 

@@ -29,16 +29,8 @@ class Step(NamedTuple):
     merged: jax.Array
 
 
-def fit_pyramid(
-    grid: Grid,
-    shift: jax.Array,
-    channels: int,
-    levels: int,
-    mean: jax.Array,
-    numbers: AdaptiveParameters,
-) -> jax.Array:
-    """Models of the finest grid, put together from all levels. Returns `(Q + 1, C, h, w)`."""
-    coarsest, steps = fit_levels(grid, shift, channels, levels, mean, numbers)
+def merged_models(coarsest: Fit, steps: list[Step]) -> jax.Array:
+    """Models of the finest grid, put together from all levels: `(Q + 1, C, h, w)`."""
     return steps[-1].merged if steps else coarsest.coefficients
 
 

@@ -82,7 +82,10 @@ def models_of_tile(
     """Models of the finest blocks `(Q + 1, C, h, w)`, and the brightness `(h/2, w/2)` they give."""
     grid = Grid(moments[:-1], moments[-1:], block)
     guides = common.shift.size
-    models = widths.fit_pyramid(grid, common.shift, channels, adaptive.LEVELS, mean, common.numbers)
+    levels = adaptive.LEVELS
+    models = widths.merged_models(
+        *widths.fit_levels(grid, common.shift, channels, levels, mean, common.numbers)
+    )
     return models, energy.block_light(models, light, guides)
 
 
