@@ -2,9 +2,9 @@
 
 render SCENE -o FILE.exr     one view of `room`, `FAMILY-SEED`, a shared scene, or an XML file
 render SCENE -o FOLDER --views N        its camera where it has one, else N random views
-render SCENE -o FOLDER --motion camera|light|object --frames N      a sequence
+render SCENE -o FOLDER --motion MOTION --frames N      a sequence
 render families [-o docs/scenes.png]    one scene of each family on a contact sheet
-render data [--folder cache/frames] [--frames 400]      training frames; resumes
+render data [--split train|val|test] [--frames N]       the data set; resumes
 render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
 render efficiency [SCENE...]            samples a second, variance x seconds of each sampling
 """
@@ -19,6 +19,7 @@ from pathlib import Path
 from experiments.render import backend
 
 VERBS = ("families", "data", "statistics", "efficiency")
+MOTIONS = ("static", "camera", "light", "switch", "object")
 
 
 def main(argv: list[str]) -> int:
@@ -73,7 +74,7 @@ def _one(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--error", type=float, default=0.02, help="goal of the reference")
     parser.add_argument("--minutes", type=float, default=20, help="at most, for a reference")
     parser.add_argument("--leave-out", nargs="*", default=[], metavar="LAYER")
-    parser.add_argument("--motion", choices=("camera", "light", "object"), help="a sequence")
+    parser.add_argument("--motion", choices=MOTIONS, help="a sequence of this")
     parser.add_argument("--frames", type=int, default=20, help="of a sequence")
 
 
@@ -85,7 +86,7 @@ def _families(parser: argparse.ArgumentParser) -> None:
 
 def _data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
-    parser.add_argument("--frames", type=int, default=400)
+    parser.add_argument("--frames", type=int, help="so many; 400 of train, all of val and test")
     parser.add_argument("--split", choices=("train", "val", "test"), default="train")
     parser.add_argument(
         "--cluster",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from experiments.render import frame
+from experiments.render import frame, sequence
 from experiments.render.manifest import Manifest
 from experiments.render.reference import Goal
 from experiments.render.sampling import stream_seed
@@ -27,21 +28,39 @@ REALISATIONS = 4
 ERROR = {"train": 0.06, "val": 0.02, "test": 0.02}
 SECONDS_PER_PIXEL = 75 / (320 * 184)  # at most, for a reference
 VIEWS = 2
+# One sequence of every scene of val and test, and what moves in it.
+MOTIONS = {
+    "veach-lamp": "object",
+    "dining-room": "camera",
+    "sponza": "camera",
+    "classroom": "object",
+    "bathroom2": "camera",
+}
+LENGTH = 20  # frames of a sequence
+SEQUENCE_GOAL = Goal(0.05, seconds=120)  # of each of its references
 
 
 @dataclass(frozen=True)
 class Job:
-    """One frame to render; `split` is the folder that it goes to."""
+    """One frame to render; `split` is the folder that it goes to.
+
+    With a `motion` it is the frame `number` of a sequence, in a folder of its own.
+    """
 
     scene: str
     view: int
     width: int
     height: int
     split: str = "train"
+    motion: str = ""
+    number: int = 0
 
     @property
     def name(self) -> str:
         """The file's name in the folder, which tells jobs apart."""
+        if self.motion:
+            shot = f"{self.scene}_{self.motion}"
+            return f"{self.split}/{shot}/{shot}_{self.number:03}.exr"
         size = "" if (self.width, self.height) == (320, 184) else f"_{self.width}x{self.height}"
         return f"{self.split}/{self.scene}_{self.view}{size}.exr"
 
@@ -70,9 +89,12 @@ def training_jobs() -> Iterator[Job]:
 
 
 def evaluation_jobs(split: str) -> Iterator[Job]:
-    """One 1920 x 1080 frame of every scene of the splits val or test."""
-    for scene in VAL if split == "val" else TEST:
+    """Of every scene of the splits val or test one 1920 x 1080 frame, then one sequence."""
+    scenes = VAL if split == "val" else TEST
+    for scene in scenes:
         yield Job(scene, 0, 1920, 1080, split)
+    for scene, number in itertools.product(scenes, range(LENGTH)):
+        yield Job(scene, 0, 640, 360, split, MOTIONS[scene], number)
 
 
 def _size(number: int, index: int, view: int) -> tuple[int, int]:
@@ -82,7 +104,10 @@ def _size(number: int, index: int, view: int) -> tuple[int, int]:
 
 
 def settings_of(job: Job) -> frame.Settings:
-    """Four 1-spp realisations and more; the reference to a goal or a bound on its time."""
+    """Four 1-spp realisations and more, of a sequence one; the reference's goal."""
+    if job.motion:
+        seed = stream_seed(job.scene, job.view, job.motion)
+        return frame.Settings(job.width, job.height, seed, goal=SEQUENCE_GOAL)
     seconds = SECONDS_PER_PIXEL * job.width * job.height if job.split == "train" else 1200
     return frame.Settings(
         job.width,
@@ -142,7 +167,13 @@ def render_job(folder: Path, job: Job) -> dict[str, Any] | str:
         return "no valid view was found"
     camera, near = found
     state = folder / "state" / (job.name.replace("/", "_") + ".npz")
-    layers, facts = frame.render(source.scene, camera, settings_of(job), near, state)
+    settings = settings_of(job)
+    if job.motion:
+        shot = sequence.Shot.of(source, camera, job.motion, LENGTH)
+        twin = folder / replace(job, number=shot.twin(job.number)).name
+        layers, facts = sequence.render(shot, job.number, settings, near, twin, state)
+    else:
+        layers, facts = frame.render(source.scene, camera, settings, near, state)
     facts = {"scene": job.scene, "view": job.view, "split": job.split} | facts
     frame.write(folder / job.name, layers, facts)
     state.unlink(missing_ok=True)

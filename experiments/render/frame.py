@@ -16,7 +16,7 @@ from experiments.render.camera import Camera
 from experiments.render.reference import Accumulator, Goal
 from experiments.render.sampling import stream_seed
 from experiments.render.tracer import Tracer
-from jflnr.exr import write_channels
+from jflnr.exr import layers_of, read_attributes, read_channels, write_channels
 
 AXES = {"normal": "XYZ", "position": "XYZ", "depth": "Z", "ao": "Y", "mask": "Y", "motion": "XY"}
 SINGLE = ("depth",)  # in float; every other layer in half
@@ -72,9 +72,7 @@ def render(
     mask = layers["mask"] > 0
     layers["direct"] = mask * tracer.direct(settings.direct_spp, seed("direct"))
     layers["direct"] /= settings.direct_spp
-    for name, spp in noisy_names(settings).items():
-        total = tracer.indirect(spp, seed(name), None, settings.bounces, settings.mis)
-        layers[name] = mask * total / spp
+    layers |= noisy(tracer, settings)
     reference = Accumulator.of(tracer, settings, seed("reference"), mask[..., 0], state)
     reference.run(settings.goal, report)
     layers["reference"], layers["reference_a"] = reference.mean(), reference.first_half()
@@ -86,6 +84,27 @@ def render(
         "reference_samples_per_second": round(reference.samples_per_second()),
     }
     return layers, header(camera, settings, ao_distance) | facts
+
+
+def noisy(tracer: Tracer, settings: Settings) -> Layers:
+    """The noisy layers, each from a stream of its own."""
+    mask = tracer.guides["mask"] > 0
+    layers: Layers = {}
+    for name, spp in noisy_names(settings).items():
+        seed = stream_seed(settings.seed, name)
+        layers[name] = mask * tracer.indirect(spp, seed, None, settings.bounces, settings.mis) / spp
+    return layers
+
+
+def renoised(path: Path, tracer: Tracer, settings: Settings) -> tuple[Layers, dict[str, Any]]:
+    """The finished frame `path` with other noise."""
+    channels = read_channels(path)
+    layers = {
+        name: np.stack([channels[f"{name}.{axis}"] for axis in axes], -1)
+        for name, axes in layers_of(channels).items()
+    }
+    facts = json.loads(read_attributes(path).comments)
+    return layers | noisy(tracer, settings), facts | {"seed": settings.seed}
 
 
 def header(camera: Camera, settings: Settings, ao_distance: float) -> dict[str, Any]:

@@ -1,16 +1,19 @@
-"""Sequences: a camera path, a moving light, or a moving object; cameras and motion vectors."""
+"""Shots: nothing, the camera, the light or an object moves; cameras and motion vectors."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.render import frame
 from experiments.render.camera import Camera
 from experiments.render.lambertian import load_xml
+from experiments.render.sampling import stream_seed
 from experiments.render.scene import build
 from experiments.render.source import Source
 from experiments.render.tracer import Tracer
@@ -20,38 +23,110 @@ from experiments.scenes.world import Ball, Material, World
 
 MOVER = "mover"
 BALL = 0.06  # radius of the moving object, as a share of the distance that is looked at
+LIGHT = ("light", "switch")
 
 
 @dataclass(frozen=True)
-class Step:
-    """One frame of a sequence: scene, camera, and the mover's matrix (4, 4) where there is one."""
+class Shot:
+    """A sequence that starts at a camera. motion: static, camera, light, switch or object.
 
-    scene: Any
-    camera: Camera
-    mover: Array | None = None
-
-
-def steps(source: Source, camera: Camera, motion: str, frames: int) -> Iterator[Step]:
-    """The frames of a sequence that starts at `camera`.
-
-    Raises ValueError where the scene cannot move in this way.
+    `switch` changes the light once, half-way. ahead: how far away what is looked at is.
     """
-    if motion == "light" and source.world is None:
-        raise ValueError(
-            f"a moving light needs a scene of ours, and {source.name} is a scene file: "
-            "use --motion camera or --motion object"
-        )
-    ahead = _ahead(source.scene, camera)
-    for number in range(frames):
-        t = number / max(frames - 1, 1)
-        if motion == "camera":
-            yield Step(source.scene, along_path(camera, ahead, t))
-        elif motion == "light":
-            assert source.world is not None
-            yield Step(build(with_light(source.world, t)), camera)
-        else:
-            matrix = mover_matrix(camera, ahead, t)
-            yield Step(_with_mover(source, matrix, BALL * ahead), camera, matrix)
+
+    source: Source
+    start: Camera
+    motion: str
+    frames: int
+    ahead: float
+
+    @classmethod
+    def of(cls, source: Source, start: Camera, motion: str, frames: int) -> Shot:
+        """Raises ValueError where the scene cannot move in this way."""
+        if motion in LIGHT and source.world is None:
+            raise ValueError(
+                f"a moving light needs a scene of ours, and {source.name} is a scene file: "
+                "use --motion static, camera or object"
+            )
+        return cls(source, start, motion, frames, _ahead(source.scene, start))
+
+    def time(self, number: int) -> float:
+        """From 0 to 1."""
+        if self.motion == "switch":
+            return 0.5 * (2 * number >= self.frames)
+        return number / max(self.frames - 1, 1)
+
+    def camera(self, number: int) -> Camera:
+        """The camera of a frame."""
+        if self.motion != "camera":
+            return self.start
+        return along_path(self.start, self.ahead, self.time(number))
+
+    def mover(self, number: int) -> Array | None:
+        """Where the moving object is in a frame, (4, 4); None where there is none."""
+        if self.motion != "object":
+            return None
+        return mover_matrix(self.start, self.ahead, self.time(number))
+
+    def scene(self, number: int) -> Any:
+        """The Mitsuba scene of a frame."""
+        mover = self.mover(number)
+        if mover is not None:
+            return _with_mover(self.source, mover, BALL * self.ahead)
+        if self.motion in LIGHT and self.source.world is not None:
+            return build(with_light(self.source.world, self.time(number)))
+        return self.source.scene
+
+    def twin(self, number: int) -> int:
+        """The first frame that differs from this one in nothing but its noise."""
+        if self.motion == "switch":
+            return 0 if 2 * number < self.frames else -(-self.frames // 2)
+        return 0 if self.motion == "static" else number
+
+    def motion_vectors(self, tracer: Tracer, number: int) -> NDArray[np.float64]:
+        """Pixels `(H, W, 2)` from here to where each point was in the previous frame (x, y).
+
+        Zero in the first frame. Where nothing is hit, the sky is taken to be far away.
+        tracer: of this frame.
+        """
+        height, width = tracer.height, tracer.width
+        if number == 0:
+            return np.zeros((height, width, 2))
+        y, x = np.mgrid[:height, :width] + 0.5
+        here = np.stack([x, y], -1)
+        depth = tracer.guides["depth"][..., 0].astype(float)
+        far = np.where(depth > 0, depth, 1e6)
+        points = self.camera(number).points(here, far, width, height)
+        now, before = self.mover(number), self.mover(number - 1)
+        if now is not None and before is not None:
+            on = tracer.shows(MOVER)
+            back = before @ np.linalg.inv(now)
+            points[on] = points[on] @ back[:3, :3].T + back[:3, 3]
+        return self.camera(number - 1).project(points, width, height) - here
+
+
+def render(
+    shot: Shot,
+    number: int,
+    settings: frame.Settings,
+    near: float,
+    twin: Path,
+    state: Path,
+    report: Callable[[float, str], None] | None = None,
+) -> tuple[frame.Layers, dict[str, Any]]:
+    """Layers and facts of a frame of a shot, its noise and reference independent of the others'.
+
+    But for twins: of what differs in nothing but its noise there is one reference, in the file
+    `twin` of the first of them.
+    """
+    settings = replace(settings, seed=stream_seed(settings.seed, "frame", number))
+    scene, camera = shot.scene(number), shot.camera(number)
+    tracer = Tracer.of(scene, camera, settings.width, settings.height)
+    if shot.twin(number) != number and twin.exists():
+        layers, facts = frame.renoised(twin, tracer, settings)
+    else:
+        layers, facts = frame.render(scene, camera, settings, near, state, report, tracer)
+    layers["motion"] = shot.motion_vectors(tracer, number)
+    return layers, facts | {"motion": shot.motion, "frame": number}
 
 
 def _ahead(scene: Any, camera: Camera) -> float:
@@ -109,22 +184,3 @@ def _with_mover(source: Source, matrix: Array, radius: float) -> Any:
     world = replace(source.world, surfaces=list(source.world.surfaces))
     world.add(ball, Material(look, 2.5 * radius), MOVER)
     return build(world)
-
-
-def motion_vectors(tracer: Tracer, step: Step, before: Step | None) -> NDArray[np.float64]:
-    """Pixels `(H, W, 2)` from here to where each point was in the previous frame (x, y).
-
-    Zero in the first frame. Where nothing is hit, the sky is taken to be far away.
-    """
-    height, width = tracer.height, tracer.width
-    if before is None:
-        return np.zeros((height, width, 2))
-    y, x = np.mgrid[:height, :width] + 0.5
-    here = np.stack([x, y], -1)
-    depth = tracer.guides["depth"][..., 0].astype(float)
-    points = step.camera.points(here, np.where(depth > 0, depth, 1e6), width, height)
-    if step.mover is not None and before.mover is not None:
-        on = tracer.shows(MOVER)
-        back = before.mover @ np.linalg.inv(step.mover)
-        points[on] = points[on] @ back[:3, :3].T + back[:3, 3]
-    return before.camera.project(points, width, height) - here

@@ -11,10 +11,10 @@ import pytest
 
 import jflnr
 from experiments.render import command, frame
-from experiments.render.dataset import Job, fill, training_jobs
+from experiments.render.dataset import Job, evaluation_jobs, fill, training_jobs
 from experiments.render.manifest import Manifest
 from experiments.render.reference import Accumulator, Goal
-from experiments.render.sequence import BALL, MOVER, motion_vectors, steps
+from experiments.render.sequence import BALL, MOVER, Shot
 from experiments.render.splits import TEST, VAL
 from experiments.render.tracer import Tracer
 from jflnr.exr import read_attributes, read_channels
@@ -115,12 +115,11 @@ def test_training_jobs_hold_no_reserved_scene() -> None:
 
 @pytest.mark.parametrize("motion", ["camera", "object", "light"])
 def test_motion_vectors_lead_to_the_same_point(room: Any, motion: str) -> None:
-    before, now = steps(room, room.own[0], motion, 2)
+    shot = Shot.of(room, room.own[0], motion, 2)
     width, height = 160, 90
-    tracer = Tracer.of(now.scene, now.camera, width, height)
-    old = Tracer.of(before.scene, before.camera, width, height)
-    vectors = motion_vectors(tracer, now, before)
-    assert (motion_vectors(old, before, None) == 0).all()
+    old, tracer = (Tracer.of(shot.scene(i), shot.camera(i), width, height) for i in range(2))
+    vectors = shot.motion_vectors(tracer, 1)
+    assert (shot.motion_vectors(old, 0) == 0).all()
     if motion == "light":
         np.testing.assert_allclose(vectors, 0, atol=1e-3)
         return
@@ -132,9 +131,36 @@ def test_motion_vectors_lead_to_the_same_point(room: Any, motion: str) -> None:
     there = old.guides["position"][np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
     here = tracer.guides["position"].astype(float)
     if motion == "object":
-        assert now.mover is not None and before.mover is not None
-        back = before.mover @ np.linalg.inv(now.mover)
+        now, before = shot.mover(1), shot.mover(0)
+        assert now is not None and before is not None
+        back = before @ np.linalg.inv(now)
         here = here @ back[:3, :3].T + back[:3, 3]
     off = np.linalg.norm(there - here, axis=-1)[on]
     depth = float(np.median(old.guides["depth"]))
     assert np.quantile(off, 0.6) < (BALL if motion == "object" else 0.02) * depth
+
+
+def test_a_switched_light_has_two_references_and_fresh_noise(tmp_path: Path) -> None:
+    arguments = ["room", "-o", str(tmp_path), *SMALL, "--motion", "switch", "--frames", "4"]
+    assert command.main(arguments) == 0
+    frames = [jflnr.read_frame(path) for path in sorted(tmp_path.glob("*.exr"))]
+    assert [jflnr.read_header(path)["frame"] for path in sorted(tmp_path.glob("*.exr"))] == [
+        *range(4)
+    ]
+    same = [[np.array_equal(a.reference, b.reference) for a in frames] for b in frames]
+    assert same == [[1, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 1], [0, 0, 1, 1]]
+    assert len({frame.indirect.tobytes() for frame in frames}) == 4
+
+
+def test_every_scene_of_val_and_test_gets_a_frame_and_a_sequence() -> None:
+    for split, scenes in (("val", VAL), ("test", TEST)):
+        jobs = list(evaluation_jobs(split))
+        assert len({job.name for job in jobs}) == len(jobs) == 21 * len(scenes)
+        assert {job.scene for job in jobs if job.motion} == set(scenes)
+
+
+def test_a_job_of_a_sequence_makes_its_frame(tmp_path: Path) -> None:
+    job = Job("forms-1", 100, 48, 27, motion="camera", number=1)
+    assert fill(tmp_path, iter([job]), 1) == 1
+    facts = jflnr.read_header(tmp_path / "train/forms-1_camera/forms-1_camera_001.exr")
+    assert facts["motion"] == "camera" and facts["frame"] == 1

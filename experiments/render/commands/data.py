@@ -7,16 +7,21 @@ import argparse
 from experiments.render import workers
 from experiments.render.dataset import evaluation_jobs, fill, training_jobs
 
+TRAINING = 400  # frames, unless the arguments say how many
+
 
 def run(arguments: argparse.Namespace) -> None:
-    """Render until the folder holds `--frames` frames of the split."""
+    """Render until there are `--frames` frames of the split; by default all of val or test."""
     split = arguments.split
-    jobs = training_jobs() if split == "train" else evaluation_jobs(split)
+    if split == "train":
+        jobs, frames = training_jobs(), arguments.frames or TRAINING
+    else:
+        every = list(evaluation_jobs(split))
+        jobs, frames = iter(every), arguments.frames or len(every)
     say = lambda line: print(line, flush=True)
     if arguments.cluster is None:
-        there = fill(arguments.folder, jobs, arguments.frames, say)
+        there = fill(arguments.folder, jobs, frames, say)
     else:
-        there = workers.fill(
-            arguments.cluster, arguments.folder, jobs, arguments.frames, arguments.threads, say
-        )
+        threads = arguments.threads
+        there = workers.fill(arguments.cluster, arguments.folder, jobs, frames, threads, say)
     print(f"{there} frames of the split {split} in {arguments.folder}")

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from experiments.render import frame
+from experiments.render import frame, sequence
+from experiments.render.camera import Camera
 from experiments.render.manifest import Manifest
 from experiments.render.progress import Progress
 from experiments.render.reference import Goal
-from experiments.render.sampling import stream_seed
-from experiments.render.sequence import Step, motion_vectors, steps
+from experiments.render.sequence import Shot
 from experiments.render.source import RANDOM, Source, load
 from experiments.render.splits import split_of
-from experiments.render.tracer import Tracer
 
 STATES = Path("cache/state")
 
@@ -71,49 +69,51 @@ def _view(
     if path.exists():
         print(f"{path} is there already: kept")
         return
-    found = source.view(number)
-    if found is None:
-        raise ValueError(f"no valid view {number} of {source.name} was found: try another --seed")
-    facts = {"view": number}
-    _write(source, Step(source.scene, found[0]), None, facts, path, settings, arguments)
+    camera, near = _found(source, number, arguments)
+    state = _state(path, settings)
+    with Progress(path.name) as progress:
+        layers, facts = frame.render(source.scene, camera, settings, near, state, progress)
+    _write(source, layers, {"view": number} | facts, path, state, arguments)
 
 
 def _sequence(source: Source, settings: frame.Settings, arguments: Any) -> None:
     number = arguments.view if arguments.view is not None else (0 if source.own else RANDOM)
-    found = source.view(number)
-    if found is None:
-        raise ValueError(f"no valid view {number} of {source.name} was found")
-    before: Step | None = None
-    for i, step in enumerate(steps(source, found[0], arguments.motion, arguments.frames)):
-        path = arguments.output / f"{source.name}_{arguments.motion}_{i:03}.exr"
-        facts = {"view": number, "motion": arguments.motion, "frame": i}
+    camera, near = _found(source, number, arguments)
+    shot = Shot.of(source, camera, arguments.motion, arguments.frames)
+    name = f"{source.name}_{arguments.motion}"
+    paths = [arguments.output / f"{name}_{i:03}.exr" for i in range(arguments.frames)]
+    for i, path in enumerate(paths):
         if path.exists():
             print(f"{path} is there already: kept")
-        else:
-            own = replace(settings, seed=stream_seed(settings.seed, "frame", i))
-            _write(source, step, before, facts, path, own, arguments)
-        before = step
+            continue
+        state = _state(path, settings)
+        with Progress(path.name) as progress:
+            twin = paths[shot.twin(i)]
+            layers, facts = sequence.render(shot, i, settings, near, twin, state, progress)
+        _write(source, layers, {"view": number} | facts, path, state, arguments)
+
+
+def _found(source: Source, number: int, arguments: Any) -> tuple[Camera, float]:
+    """The camera of a view, and its ambient occlusion distance."""
+    found = source.view(number)
+    if found is None:
+        raise ValueError(f"no valid view {number} of {source.name} was found: try another --seed")
+    return found[0], arguments.ao_distance or found[1]
+
+
+def _state(path: Path, settings: frame.Settings) -> Path:
+    return STATES / f"{path.stem}_{settings.width}x{settings.height}.npz"
 
 
 def _write(
     source: Source,
-    step: Step,
-    before: Step | None,
+    layers: frame.Layers,
     facts: dict[str, Any],
     path: Path,
-    settings: frame.Settings,
+    state: Path,
     arguments: Any,
 ) -> None:
-    near = arguments.ao_distance or source.ao_distance
-    tracer = Tracer.of(step.scene, step.camera, settings.width, settings.height)
-    state = STATES / f"{path.stem}_{settings.width}x{settings.height}.npz"
-    with Progress(path.name) as progress:
-        layers, more = frame.render(
-            step.scene, step.camera, settings, near, state, progress, tracer
-        )
-    if "motion" in facts:
-        layers["motion"] = motion_vectors(tracer, step, before)
-    facts = {"scene": source.name, "split": split_of(source.name)} | facts | more
+    facts = {"scene": source.name, "split": split_of(source.name)} | facts
     frame.write(path, layers, facts, tuple(arguments.leave_out))
     state.unlink(missing_ok=True)
     if path != arguments.output:  # a folder of frames has a manifest, a single frame its header
