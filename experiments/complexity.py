@@ -11,10 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments import plots, results
-from experiments.peers import bmfr, guided
+from experiments.peers import guided
 from experiments.speed import interleaved, synthetic
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
+from jflnr.temporal import bmfr_fit
 
 NAME = "complexity"
 QUESTION = "How does time grow with the number of guides and with pixels, ours and BMFR's?"
@@ -60,8 +61,8 @@ _flr = jax.jit(flr)
 
 @jax.jit
 def _bmfr(y: jax.Array, x: jax.Array) -> jax.Array:
-    squared = jnp.zeros(x.shape[-1], bool)
-    return bmfr.fit(y, x, squared, 32, 0.01, (0, 0), jax.random.key(0))
+    surface = jnp.ones_like(y[..., :1], bool)
+    return bmfr_fit.fit(y, x, surface, 0, jnp.zeros(2, int))
 
 
 @jax.jit
