@@ -1,0 +1,60 @@
+"""Temporal anti-aliasing (Karis 2014, "High Quality Temporal Supersampling"), phase III of BMFR."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.ndimage import map_coordinates
+
+from jflnr.frame import Array
+
+# Luma, orange and green of a colour; halves and quarters, so that the way back loses nothing.
+YCOCG = ((0.25, 0.5, 0.25), (0.5, 0.0, -0.5), (-0.25, 0.5, -0.25))
+RGB = ((1.0, 1.0, -1.0), (1.0, 0.0, 1.0), (1.0, -1.0, -1.0))
+CROSS = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+def smooth(picture: jax.Array, before: jax.Array, motion: Array, share: Array) -> jax.Array:
+    """The picture mixed with its predecessor, which is first brought into the range around it.
+
+    picture: `(H, W, 3)`. before: the result of the previous frame, read bilinearly where each pixel
+    was. motion: `(H, W, 2)`, pixels to there. share: of the new picture; where it shows what was
+    outside before, or whose motion is not known, it is taken as it is.
+    Returns `(H, W, 3)`.
+    """
+    place = where_it_was(motion)
+    was_there = inside(place, picture.shape[:2])[..., None]
+    place = jnp.where(was_there[..., 0], place, 0)
+    read = lambda channel: map_coordinates(channel, list(place), order=1, mode="nearest")
+    history = jnp.stack([read(before[..., c]) for c in range(3)], axis=-1) @ jnp.array(YCOCG).T
+    colour = picture @ jnp.array(YCOCG).T
+    history = jnp.clip(history, *neighbourhood(colour))
+    mixed = history + share * (colour - history)
+    return jnp.where(was_there, mixed @ jnp.array(RGB).T, picture)
+
+
+def where_it_was(motion: Array) -> jax.Array:
+    """Row and column of each pixel in the previous frame, `(2, H, W)`."""
+    y, x = jnp.mgrid[: motion.shape[0], : motion.shape[1]]
+    return jnp.stack([y + motion[..., 1], x + motion[..., 0]])
+
+
+def inside(place: jax.Array, size: tuple[int, int]) -> jax.Array:
+    """Whether a place `(2, H, W)` lies among the pixels' centres, `(H, W)`; NaN does not."""
+    last = jnp.array(size)[:, None, None] - 1
+    return jnp.all((place >= 0) & (place <= last), axis=0)
+
+
+def neighbourhood(colour: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Least and largest value around each pixel, each the mean of those of 5 and of 9 pixels."""
+    height, width = colour.shape[:2]
+    padded = jnp.pad(colour, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    take = lambda y, x: padded[1 + y : 1 + y + height, 1 + x : 1 + x + width]
+    cross = jnp.stack([take(*at) for at in CROSS])
+    corners = jnp.stack([take(*at) for at in CORNERS])
+    low, high = cross.min(0), cross.max(0)
+    return (
+        (low + jnp.minimum(low, corners.min(0))) / 2,
+        (high + jnp.maximum(high, corners.max(0))) / 2,
+    )
