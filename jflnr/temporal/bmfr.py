@@ -39,11 +39,14 @@ class BmfrParameters(NamedTuple):
     picture_share: float = 0.2
 
 
+PAPER = BmfrParameters()
+
+
 class History(NamedTuple):
     """What a frame leaves to the next.
 
     number: how many frames there were, `()`. surface: of the last one; its depth is 0 where nothing
-    can be taken over. count: samples in `light`, `(H, W, 1)`. light: the accumulated noisy light,
+    can be taken over. count: samples in `light`, `(H, W, 1)`, whole numbers. light: the accumulated noisy light,
     fitted: the accumulated fitted light, picture: of that, multiplied by albedo, the result of TAA;
     all `(H, W, 3)`.
     """
@@ -65,7 +68,7 @@ def start(frame: Frame) -> History:
 
 @functools.partial(jax.jit, static_argnames="parameters")
 def step(
-    history: History, frame: Frame, parameters: BmfrParameters = BmfrParameters()
+    history: History, frame: Frame, parameters: BmfrParameters = PAPER
 ) -> tuple[History, jax.Array]:
     """The next frame of a sequence.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from jflnr.frame import Array
 
-# Displacements of the grid, in blocks: the paper's sequence of 16, here spread evenly (section 6.1).
+# Displacements of the grid, in blocks: a sequence of 16 (section 6.1), here spread evenly.
 OFFSETS = np.arange(16)[:, None] * np.array([0.7548776662466927, 0.5698402909980532]) % 1
 
 
