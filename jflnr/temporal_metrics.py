@@ -1,0 +1,174 @@
+"""How a denoised sequence behaves in time: flicker, lag after a change of light, recovery.
+
+Flicker is taken, as all picture metrics are (`jflnr.metrics`), on displayed pictures; one exposure
+serves the whole sequence, or its changes would count. Time is in frames.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import jax
+import numpy as np
+
+from jflnr import checks
+from jflnr.frame import Array, Frame
+from jflnr.metrics import display, exposure, measure
+from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# Lag compares means over squares of so many pixels: what noise is left there is small.
+SQUARE = 8
+# Steps of the lag that is searched for.
+STEPS = 10
+# Frames since a place was first seen, and how they are grouped.
+AGES = {"0": (0, 1), "1 to 3": (1, 4), "4 to 7": (4, 8), "8 and more": (8, np.inf)}
+
+_find_taps = jax.jit(find_taps)
+
+
+def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[dict]:
+    """Metrics of every frame: those of `measure`, `temporal_error` and `warped_error`.
+
+    lights: demodulated indirect light `(H, W, 3)` of each frame. The first frame has no errors in
+    time. Raises ValueError for a frame without a reference or, from the second on, motion.
+    """
+    if len(frames) != len(lights) or not frames:
+        raise ValueError(f"{len(frames)} frames and {len(lights)} denoised ones do not match")
+    if any(frame.reference is None for frame in frames):
+        raise ValueError("every frame needs a layer reference to measure against")
+    scale = sequence_exposure(frames)
+    rows = [dict(measure(frames[0], lights[0]))]
+    for i in range(1, len(frames)):
+        pair = (frames[i - 1], frames[i]), (lights[i - 1], lights[i])
+        times = {
+            "temporal": temporal_error(*pair, scale),
+            "warped": warped_error(*pair, scale),
+        }
+        rows.append(measure(frames[i], lights[i]) | times)
+    return rows
+
+
+def sequence_exposure(frames: Sequence[Frame]) -> float:
+    """The factor that brings the mean of all references to 0.35."""
+    return exposure(np.stack([_reflected(frame, frame.reference) for frame in frames]))
+
+
+def temporal_error(frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float) -> float:
+    """Mean absolute difference of the luminance of adjacent pictures (BMFR, Table 3).
+
+    It contains what truly changes: compare it with that of the references.
+    """
+    before, now = (_shown(frame, light, scale) for frame, light in zip(frames, lights, strict=True))
+    return float(np.mean(np.abs(now - before)))
+
+
+def warped_error(frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float) -> float:
+    """The same, with the light of the first frame moved to where its surfaces are in the second.
+
+    Of the pixels that both frames show; NaN if there are none. Both lights are multiplied by the
+    second frame's albedo, so that neither motion nor the resampling of a texture counts.
+    """
+    before, now = frames
+    taps = taps_between(before, now)
+    seen = np.asarray(taps.seen)[..., 0]
+    if now.mask is not None:
+        seen = seen & (np.asarray(now.mask)[..., 0] > 0)
+    moved = np.asarray(gather(taps, np.asarray(lights[0], np.float32)))
+    change = np.abs(_shown(now, lights[1], scale) - _shown(now, moved, scale))
+    return float(np.mean(change[seen])) if seen.any() else float("nan")
+
+
+def taps_between(before: Frame, now: Frame) -> Taps:
+    """Where the pixels of a frame were in the one before. Raises ValueError without motion."""
+    if now.motion is None:
+        raise ValueError("the frame has no layer motion, so it cannot be compared with the last")
+    checks.same_size(before=before.normal, now=now.normal)
+    return _find_taps(now.motion, Surface.of(now), Surface.of(before))
+
+
+def lag(lights: Array, references: Array) -> float:
+    """How many frames ago the light was as the denoised sequence shows it.
+
+    The delay, of at most half the sequence, at which its second half is nearest to the references,
+    which are interpolated between frames. lights, references: `(T, H, W, 3)`, demodulated.
+    """
+    shown, true = (_squares(np.asarray(images, np.float64)) for images in (lights, references))
+    first = len(true) // 2
+    delays = np.arange(first * STEPS + 1) / STEPS
+
+    def distance(delay: float) -> float:
+        whole, part = int(delay), delay % 1
+        late = true[first - whole : len(true) - whole]
+        later = true[first - whole - 1 : len(true) - whole - 1] if part else late
+        return float(np.sum((shown[first:] - (1 - part) * late - part * later) ** 2))
+
+    return float(delays[np.argmin([distance(delay) for delay in delays])])
+
+
+def response(lights: Array, before: Array, after: Array) -> np.ndarray:
+    """How far each frame has followed a change of light: 0 as before it, 1 as after it, `(T,)`.
+
+    lights: `(T, H, W, 3)`. before, after: the converged light `(H, W, 3)`.
+    """
+    shown, old, new = (_squares(np.asarray(i, np.float64)) for i in (lights, before, after))
+    change = new - old
+    if not (power := np.sum(change**2)):
+        raise ValueError("the light before and after is the same, so nothing can be followed")
+    return np.sum((shown - old) * change, axis=(1, 2, 3)) / power
+
+
+def ages(frames: Sequence[Frame]) -> np.ndarray:
+    """For how many frames each pixel's place has been in view, `(T, H, W)`.
+
+    Infinite for what has been since the first frame.
+    """
+    found = [np.full(frames[0].normal.shape[:2], np.inf)]
+    for before, now in itertools.pairwise(frames):
+        taps = taps_between(before, now)
+        nearest = np.argmax(taps.weight, axis=-1, keepdims=True)
+        place = np.take_along_axis(np.asarray(taps.pixel), nearest, axis=-1)[..., 0]
+        found.append(np.where(np.asarray(taps.seen)[..., 0], found[-1].ravel()[place] + 1, 0))
+    return np.stack(found)
+
+
+def recovery(frames: Sequence[Frame], lights: Sequence[Array]) -> dict[str, float | None]:
+    """PSNR of displayed pixels by how long ago they came into view (`AGES`); None without any.
+
+    Pixels outside the mask and those in view since the first frame are left out.
+    """
+    scale, errors = sequence_exposure(frames), []
+    for frame, light in zip(frames, lights, strict=True):
+        shown = [display(_reflected(frame, image), scale) for image in (light, frame.reference)]
+        errors.append(np.mean((shown[0] - shown[1]) ** 2, axis=-1))
+    error, age = np.stack(errors), ages(frames)
+    inside = np.stack(
+        [np.ones(error.shape[1:]) if f.mask is None else f.mask[..., 0] for f in frames]
+    )
+    found: dict[str, float | None] = {}
+    for name, (low, high) in AGES.items():
+        chosen = error[(age >= low) & (age < high) & (inside > 0)]
+        found[name] = float(-10 * np.log10(chosen.mean())) if chosen.size else None
+    return found
+
+
+def _reflected(frame: Frame, light: Array | None) -> np.ndarray:
+    return np.asarray(frame.albedo, np.float64) * np.asarray(light, np.float64)
+
+
+def _shown(frame: Frame, light: Array, scale: float) -> np.ndarray:
+    """Luminance of the displayed picture, `(H, W)`."""
+    return display(_reflected(frame, light), scale) @ LUMINANCE
+
+
+def _squares(images: np.ndarray) -> np.ndarray:
+    """Means over squares of pixels, `(..., h, w, 3)`; what is left over at the borders is not used.
+
+    images: `(..., H, W, 3)`.
+    """
+    *rest, height, width, channels = images.shape
+    side = min(SQUARE, height, width)
+    h, w = height // side, width // side
+    cut = images[..., : h * side, : w * side, :]
+    return cut.reshape(*rest, h, side, w, side, channels).mean((-4, -2))
