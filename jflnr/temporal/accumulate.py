@@ -18,12 +18,12 @@ from jflnr.temporal.reproject import Taps, gather
 class Average(NamedTuple):
     """An image averaged over frames.
 
-    mean: `(H, W, C)`. count: `(H, W, 1)`, of how many independent frames the mean has the variance;
+    mean: `(H, W, C)`. samples: `(H, W, 1)`, of how many independent frames the mean has the variance;
     0 where nothing is known, and the mean is 0.
     """
 
     mean: jax.Array
-    count: jax.Array
+    samples: jax.Array
 
 
 def nothing(height: int, width: int, channels: int) -> Average:
@@ -54,6 +54,6 @@ def accumulate(before: Average, image: Array, least: Array | float) -> Average:
     good = jnp.all(jnp.isfinite(image), axis=-1, keepdims=True)
     share = jnp.maximum(1 / (n + 1), least)
     kept = jnp.where(n > 0, (1 - share) ** 2 / jnp.where(n > 0, n, 1), 0)
-    count = 1 / (kept + share**2)
+    samples = 1 / (kept + share**2)
     mixed = mean + share * (jnp.where(good, image, 0) - mean)
-    return Average(jnp.where(good, mixed, mean), jnp.where(good, count, n))
+    return Average(jnp.where(good, mixed, mean), jnp.where(good, samples, n))

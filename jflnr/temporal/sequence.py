@@ -112,20 +112,20 @@ def _step(
     taps = find_taps(motion, surface, state.surface)
     light = accumulate(reproject(state.light, taps), frame.indirect, temporal.light)
     fitted = _fit(
-        dataclasses.replace(frame, indirect=light.mean), light.count, parameters, names, support
+        dataclasses.replace(frame, indirect=light.mean), light.samples, parameters, names, support
     )
     image = accumulate(reproject(state.image, taps), fitted, temporal.image)
     return State(surface, light, image), image.mean
 
 
 def _fit(
-    frame: Frame, count: jax.Array, parameters: Any, names: tuple[str, ...], support: int
+    frame: Frame, samples: jax.Array, parameters: Any, names: tuple[str, ...], support: int
 ) -> jax.Array:
     """The spatial method, where a pixel weighs as much as the frames it has seen."""
     adaptive = isinstance(parameters, AdaptiveParameters)
     images = (adaptive_images if adaptive else flr_images)(frame, names)
     there = images.pop("weight")
-    weight = count[..., 0] if there is None else jnp.where(there, count[..., 0], 0)
+    weight = samples[..., 0] if there is None else jnp.where(there, samples[..., 0], 0)
     if adaptive:
         return flr_adaptive(parameters=parameters, weight=weight, **images)
     return flr(parameters=parameters, weight=weight, support=support, **images)
