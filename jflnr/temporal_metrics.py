@@ -39,14 +39,11 @@ def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[d
     if any(frame.reference is None for frame in frames):
         raise ValueError("every frame needs a layer reference to measure against")
     scale = sequence_exposure(frames)
-    rows = [dict(measure(frames[0], lights[0]))]
+    rows = [measure(*pair) for pair in zip(frames, lights, strict=True)]
     for i in range(1, len(frames)):
         pair = (frames[i - 1], frames[i]), (lights[i - 1], lights[i])
-        times = {
-            "temporal": temporal_error(*pair, scale),
-            "warped": warped_error(*pair, scale),
-        }
-        rows.append(measure(frames[i], lights[i]) | times)
+        rows[i]["temporal"] = temporal_error(*pair, scale)
+        rows[i]["warped"] = warped_error(*pair, scale)
     return rows
 
 

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from jflnr import layouts
+from jflnr.cli import shots
 from jflnr.cli.common import add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Denoiser, Record, failure
 from jflnr.cli.jobs import Job, plan
@@ -51,6 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--error-map",
         action="store_true",
         help="with flr-adaptive: add its standard error as the layer `error`",
+    )
+    add("--temporal", action="store_true", help="use the frames before: a folder is a shot")
+    add(
+        "--history",
+        type=Path,
+        metavar="FILE",
+        help="keep there what the next frame needs, for a later run to go on from (--temporal)",
     )
     add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
     add(
@@ -114,6 +122,8 @@ def _records(
     denoiser: Denoiser, jobs: list[Job], arguments: argparse.Namespace
 ) -> Iterator[Record]:
     """What becomes of the frames, in the order in which they are finished."""
+    if shots.wanted(arguments):
+        return shots.records(denoiser, jobs, arguments)
     if arguments.cluster is None:
         return pipelined(jobs, denoiser.read, denoiser.denoise, denoiser.write)
     from jflnr import cluster

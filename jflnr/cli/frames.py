@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 # What became of a frame, as JSON can hold it.
 Record = dict[str, Any]
+# Denoised light, and its standard error if that was asked for.
+Light = tuple[np.ndarray, np.ndarray | None]
 
 DIRECT = "Direct light is left as it was rendered; --direct denoises it too."
 
@@ -77,16 +79,27 @@ class Denoiser:
 
     def read(self, job: Job) -> Loaded | Record:
         """The frame in memory, or only how large its pieces are to be."""
+        return self.kept(job) or self.load(job)
+
+    def kept(self, job: Job) -> Record | None:
+        """The record of a frame whose output is there and stays."""
         outputs = [job.target, job.preview] if self.arguments.png else [job.target]
         kept = [str(path) for path in outputs if path.exists()]
-        if kept and not self.arguments.overwrite:
-            return _record(job) | {"status": "kept", "kept": kept}
+        if not kept or self.arguments.overwrite:
+            return None
+        return _record(job) | {"status": "kept", "kept": kept}
+
+    def load(self, job: Job) -> Loaded | Record:
+        """As `read`, also of a frame whose output is there."""
         return self._reported(job, lambda: self._read(job))
 
-    def denoise(self, loaded: Loaded | Record) -> Denoised | Record:
+    def denoise(
+        self, loaded: Loaded | Record, light: Callable[["Frame"], Light] | None = None
+    ) -> Denoised | Record:
+        """light: what denoises instead of `jflnr.denoise`; it may be called twice."""
         if isinstance(loaded, dict):
             return loaded
-        return self._reported(loaded.job, lambda: self._denoise(loaded))
+        return self._reported(loaded.job, lambda: self._denoise(loaded, light or self._light))
 
     def write(self, denoised: Denoised | Record) -> Record:
         if isinstance(denoised, dict):
@@ -115,7 +128,9 @@ class Denoiser:
         self.exr_seconds["read"] += time.perf_counter() - start
         return Loaded(job, source, frame_of(source))
 
-    def _denoise(self, loaded: Loaded) -> Denoised | Record:
+    def _denoise(
+        self, loaded: Loaded, denoise_light: Callable[["Frame"], Light]
+    ) -> Denoised | Record:
         from jflnr.metrics import measure
 
         job, source, frame, tile = loaded
@@ -136,7 +151,7 @@ class Denoiser:
             warnings.simplefilter("always", UserWarning)
             # The first frame of a kind is denoised twice, to tell compiling from denoising.
             for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
-                light, light_error = self._light(noisy)
+                light, light_error = denoise_light(noisy)
                 times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
@@ -162,14 +177,14 @@ class Denoiser:
             from jflnr.opencl.context import default_context
             from jflnr.opencl.profile import profile
 
-            rows = profile(default_context(), lambda: self._light(noisy))
+            rows = profile(default_context(), lambda: denoise_light(noisy))
             record["profile"] = [row._asdict() for row in rows]
         if arguments.reference:
             images = {"noisy": frame.indirect, "denoised": lights["indirect"]}
             record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
         return Denoised(job, source, frame, lights, light_error, about, record)
 
-    def _light(self, frame: "Frame") -> tuple[np.ndarray, np.ndarray | None]:
+    def _light(self, frame: "Frame") -> Light:
         from jflnr.denoising import denoise
         from jflnr.uncertainty import denoise_with_error
 

@@ -1,5 +1,7 @@
 """Which frames a command line means, and where their results go."""
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,17 +22,23 @@ class Job:
 
 
 def expand(inputs: Sequence[Path]) -> list[Path]:
-    """The EXR files meant: a file stands for itself, a folder for the `*.exr` in it, sorted."""
+    """The EXR files meant: a file stands for itself, a folder for the `*.exr` in it, in order."""
     files: list[Path] = []
     for path in inputs:
         if not path.is_dir():
             files.append(path)
             continue
-        found = sorted(p for p in path.glob("[!.]*") if p.suffix.lower() == ".exr")
+        found = sorted((p for p in path.glob("[!.]*") if p.suffix.lower() == ".exr"), key=natural)
         if not found:
             raise ValueError(f"{path}: there is no EXR file in this folder")
         files.extend(found)
     return files
+
+
+def natural(path: Path) -> list[tuple[float, str]]:
+    """What to sort by so that `f_2.exr` comes before `f_10.exr`."""
+    parts = re.findall(r"\d+|\D+", path.name)
+    return [(int(part), "") if part.isdecimal() else (math.inf, part) for part in parts]
 
 
 def plan(inputs: Sequence[Path], output: Path) -> list[Job]:

@@ -10,7 +10,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     from jflnr.denoising import BACKENDS, BLOCK, METHODS
     from jflnr.flr import parameters
 
-    checks.choice("--method", arguments.method, METHODS)
+    checks.choice("--method", arguments.method, tuple(dict.fromkeys((*METHODS, "bmfr"))))
     checks.choice("--backend", arguments.backend, BACKENDS)
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
@@ -42,6 +42,8 @@ def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
         if getattr(arguments, name) is not None:
             option = name.replace("_", "-")
             raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
+    if arguments.method == "bmfr" and arguments.guides is not None:
+        raise ValueError("--guides is not for --method bmfr, whose features are the paper's")
     own = None if arguments.params is None else weights.load(arguments.params)[0]
     return {
         "method": arguments.method,

@@ -1,0 +1,227 @@
+"""Shots: frames that are denoised in order, each with what the ones before it left.
+
+That is not in the outputs. A run that was interrupted goes on from the file of `--history`, or else
+from the shot's first frame, where it denoises once more what is there already without writing it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import itertools
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jflnr.cli.frames import Denoised, Denoiser, Light, Loaded, Record, failure
+from jflnr.cli.jobs import Job, natural
+from jflnr.cli.pipeline import pipelined
+
+if TYPE_CHECKING:
+    from jflnr.frame import Frame
+    from jflnr.history import History
+
+# What a history depends on.
+OPTIONS = ("method", "spp", "map", "direct", "guides", "params", "sigma", "eps", "eps_prime")
+
+UNKNOWN_MOTION = "Without a layer motion and a camera, everything is taken to stand still."
+
+
+def wanted(arguments: argparse.Namespace) -> bool:
+    """Whether frames are to be denoised as shots. Raises ValueError if something excludes that."""
+    if not (arguments.temporal or arguments.history is not None or arguments.method == "bmfr"):
+        return False
+    for name, alone in (("error_map", False), ("profile", False), ("block", None)):
+        if getattr(arguments, name) != alone:
+            raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
+    if arguments.backend != "jax":
+        raise ValueError("shots are denoised on the jax backend: leave --backend out")
+    return True
+
+
+def records(
+    denoiser: Denoiser, jobs: Sequence[Job], arguments: argparse.Namespace
+) -> Iterator[Record]:
+    """What becomes of the frames of all shots; on a cluster, a shot is what a worker is given."""
+    shots = shots_of(jobs)
+    if arguments.history is not None and len(shots) > 1:
+        raise ValueError(
+            f"--history is of one shot, and the frames are of {len(shots)} folders: "
+            "give one folder, or leave --history out"
+        )
+    runner = ShotDenoiser(denoiser, arguments.history)
+    if arguments.cluster is None:
+        return itertools.chain.from_iterable(map(runner.records, shots))
+    from jflnr import cluster
+
+    return itertools.chain.from_iterable(cluster.each(arguments.cluster, runner, shots, _failed))
+
+
+def _failed(shot: Sequence[Job], error: BaseException) -> list[Record]:
+    return [failure(job, error) for job in shot]
+
+
+def shots_of(jobs: Iterable[Job]) -> list[list[Job]]:
+    """The jobs of each folder, in natural order: one shot each."""
+    shots: dict[Path, list[Job]] = {}
+    for job in jobs:
+        shots.setdefault(job.source.parent, []).append(job)
+    return [sorted(shot, key=lambda job: natural(job.source)) for shot in shots.values()]
+
+
+@dataclass
+class ShotDenoiser:
+    """Denoises shots, one after another. history: the file of `--history`."""
+
+    denoiser: Denoiser
+    history: Path | None = None
+
+    def __call__(self, shot: Sequence[Job]) -> list[Record]:
+        return list(self.records(shot))
+
+    def records(self, shot: Sequence[Job]) -> Iterator[Record]:
+        """What becomes of each frame. Raises ValueError if the history is not that of this shot."""
+        before = self._before()
+        kept = [self.denoiser.kept(job) for job in shot]
+        done = 0 if before is None else _frames_in(before, shot)
+        if missing := [job for job, there in zip(shot[:done], kept, strict=False) if not there]:
+            raise ValueError(
+                f"{self.history} is past {missing[0].source}, which has to be denoised: "
+                "delete it, and the shot starts from its first frame"
+            )
+        last = max((i + 1 for i, there in enumerate(kept) if not there), default=done)
+        running = _Running(self.denoiser, self.history, before)
+        yield from (record for record in kept[:done] if record)
+        yield from pipelined(shot[done:last], running.read, running.denoise, running.write)
+        yield from (record for record in kept[last:] if record)
+
+    def _before(self) -> History | None:
+        """What an earlier run left, if it was like this one."""
+        from jflnr import history
+
+        if self.history is None or not self.history.exists():
+            return None
+        found = history.read(self.history)
+        for name, value in _options(self.denoiser.arguments).items():
+            if (other := found.about["options"].get(name)) != value:
+                raise ValueError(
+                    f"{self.history} was made with --{name.replace('_', '-')} {other}, and this is "
+                    f"{value}: delete it, or name another file"
+                )
+        return found
+
+
+@dataclass
+class _Running:
+    """A shot on its way. state: after the last frame that was denoised; header: that of the last
+    frame that was read."""
+
+    denoiser: Denoiser
+    history: Path | None
+    before: History | None
+    state: Any = None
+    header: dict[str, Any] = field(default_factory=dict)
+    failed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.before is not None:
+            self.header = self.before.about["header"]
+
+    def read(self, job: Job) -> Loaded | Record:
+        """The frame, with motion from the cameras if it has none of its own."""
+        loaded = self.denoiser.load(job)
+        if isinstance(loaded, dict):
+            return loaded
+        if loaded.source is None or loaded.frame is None:
+            return failure(job, ValueError("a shot needs whole frames in memory: raise --memory"))
+        header, self.header = self.header, loaded.source.header
+        return loaded._replace(frame=_with_motion(loaded.frame, self.header, header))
+
+    def denoise(self, loaded: Loaded | Record) -> tuple[Denoised | Record, Any]:
+        """The denoised frame, and the state after it."""
+        if isinstance(loaded, dict):
+            return loaded, self.state
+        after = self.state
+
+        def light(frame: Frame) -> Light:
+            nonlocal after
+            after, image = self._step(frame)
+            return image, None
+
+        denoised = self.denoiser.denoise(loaded, light)
+        if isinstance(denoised, Denoised):
+            self.state = after
+        return denoised, self.state
+
+    def _step(self, frame: Frame) -> tuple[Any, np.ndarray]:
+        from jflnr import temporal
+        from jflnr.temporal import bmfr
+
+        settings = self.denoiser.settings
+        own = settings["method"] == "bmfr"
+        state = self.state
+        if state is None:
+            state = bmfr.start(frame) if own else temporal.start(frame)
+            if self.before is not None:
+                state = self.before.state(state)
+        if frame.motion is None:
+            warnings.warn(UNKNOWN_MOTION, stacklevel=1)
+            frame = dataclasses.replace(frame, motion=np.zeros((*frame.depth.shape[:2], 2)))
+        if own:
+            state, image = bmfr.step(state, frame)
+        else:
+            options = {name: settings[name] for name in ("method", "guides", "parameters")}
+            state, image = temporal.step(state, frame, **options)
+        return state, np.asarray(image, np.float32)
+
+    def write(self, done: tuple[Denoised | Record, Any]) -> Record:
+        """Write the frame, unless it is there, then the history, so that it is never ahead."""
+        from jflnr import history
+
+        denoised, state = done
+        if isinstance(denoised, dict):
+            self.failed = True  # from here on the history would hide that a frame is missing
+            return denoised
+        record = self.denoiser.kept(denoised.job) or self.denoiser.write(denoised)
+        self.failed = self.failed or "error" in record
+        if self.history is not None and not self.failed:
+            source = denoised.source
+            about = {
+                "options": _options(self.denoiser.arguments),
+                "last": _identity(source.path),
+                "header": source.header,
+            }
+            history.write(self.history, state, about)
+        return record
+
+
+def _options(arguments: argparse.Namespace) -> dict[str, str]:
+    return {name: str(getattr(arguments, name)) for name in OPTIONS}
+
+
+def _identity(path: Path) -> list[Any]:
+    """What tells a frame's file from one that took its place."""
+    status = path.stat()
+    return [path.name, status.st_size, status.st_mtime_ns]
+
+
+def _frames_in(before: History, shot: Sequence[Job]) -> int:
+    """How many of the shot's frames are in the history; 0 if it ends with another one's frame."""
+    for i, job in enumerate(shot):
+        if job.source.exists() and _identity(job.source) == before.about["last"]:
+            return i + 1
+    return 0
+
+
+def _with_motion(frame: Frame, header: dict[str, Any], before: dict[str, Any]) -> Frame:
+    """The frame with motion from its camera and the last frame's, if it has none and they do."""
+    from jflnr.temporal import Camera, camera_motion
+
+    camera, last = Camera.of(header), Camera.of(before)
+    if frame.motion is not None or camera is None or last is None:
+        return frame
+    return dataclasses.replace(frame, motion=np.asarray(camera_motion(frame.depth, camera, last)))

@@ -1,0 +1,57 @@
+"""What one frame of a sequence leaves to the next, as a file: arrays, and a few words on them."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jflnr.files import replacing
+
+FORMAT = "jflnr-history"
+
+
+class History(NamedTuple):
+    """The content of a file. about: what was said of it. arrays: the leaves of the state."""
+
+    path: Path
+    about: dict[str, Any]
+    arrays: list[np.ndarray]
+
+    def state(self, like: Any) -> Any:
+        """The state, a pytree with the structure of `like`, which may be of another moment.
+
+        Raises `ValueError` if it is of another method or of frames of another size.
+        """
+        leaves, structure = jax.tree.flatten(like)
+        wanted, found = ([np.shape(leaf) for leaf in some] for some in (leaves, self.arrays))
+        if wanted != found:
+            raise ValueError(
+                f"{self.path} is of frames of another size or with other layers than this one"
+            )
+        arrays = zip(self.arrays, leaves, strict=True)
+        return jax.tree.unflatten(structure, [a.astype(leaf.dtype) for a, leaf in arrays])
+
+
+def read(path: Path) -> History:
+    """The history in a file. Raises `OSError` and, if it is no such file, `ValueError`."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            about = json.loads(str(stored[FORMAT]))
+            arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
+    except (KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        raise ValueError(f"{path} is not a history that --history wrote, or is damaged") from None
+    return History(path, about, arrays)
+
+
+def write(path: Path, state: Any, about: Mapping[str, Any]) -> None:
+    """Write a state, atomically. about: what JSON can hold."""
+    stored: dict[str, Any] = {FORMAT: np.array(json.dumps(about))}
+    stored |= {f"array{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
+    with replacing(path) as beside, beside.open("wb") as file:
+        np.savez(file, **stored)
