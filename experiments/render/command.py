@@ -5,6 +5,7 @@ render SCENE -o FOLDER --views N        its camera where it has one, else N rand
 render SCENE -o FOLDER --motion MOTION --frames N      a sequence
 render families [-o docs/scenes.png]    one scene of each family on a contact sheet
 render data [--split train|val|test] [--frames N]       the data set; resumes
+render shots [--folder cache/sequences]         those of the experiment `sequences`; resumes
 render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
 render efficiency [SCENE...]            samples a second, variance x seconds of each sampling
 """
@@ -18,7 +19,7 @@ from pathlib import Path
 
 from experiments.render import backend
 
-VERBS = ("families", "data", "statistics", "efficiency")
+VERBS = ("families", "data", "shots", "statistics", "efficiency")
 MOTIONS = ("static", "camera", "light", "switch", "object")
 
 
@@ -50,6 +51,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
         "one": _one,
         "families": _families,
         "data": _data,
+        "shots": _shots,
         "statistics": _statistics,
         "efficiency": _efficiency,
     }[verb](parser)
@@ -59,6 +61,18 @@ def _parser(verb: str) -> argparse.ArgumentParser:
 def _one(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", help="room, FAMILY-SEED (stairs-3), a shared scene, or an XML")
     parser.add_argument("-o", "--output", type=Path, required=True, help="EXR file, or a folder")
+    parser.add_argument("--motion", choices=MOTIONS, help="a sequence of this")
+    parser.add_argument("--error", type=float, default=0.02, help="goal of the reference")
+    _rendering(parser)
+
+
+def _shots(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--folder", type=Path, default=Path("cache/sequences"))
+    _rendering(parser)
+    parser.set_defaults(width=320, height=180, direct_spp=64, minutes=3)
+
+
+def _rendering(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--width", type=int, default=640)
     parser.add_argument("--height", type=int, default=360)
     parser.add_argument("--seed", type=int, default=0, help="of the noise and of random views")
@@ -71,10 +85,8 @@ def _one(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ao-distance", type=float, help="in scene units")
     parser.add_argument("--direct-spp", type=int, default=256)
     parser.add_argument("--reference-spp", type=int, help="exactly so many, whatever the error")
-    parser.add_argument("--error", type=float, default=0.02, help="goal of the reference")
     parser.add_argument("--minutes", type=float, default=20, help="at most, for a reference")
     parser.add_argument("--leave-out", nargs="*", default=[], metavar="LAYER")
-    parser.add_argument("--motion", choices=MOTIONS, help="a sequence of this")
     parser.add_argument("--frames", type=int, default=20, help="of a sequence")
 
 
