@@ -65,15 +65,17 @@ class Context:
         arguments: Sequence[Any],
         moved: int | None = None,
         alone: bool = False,
+        group: int | None = None,
     ) -> None:
         """Enqueue kernel `name` of kernels_cl/`file`; `size` is padded to whole work-groups.
 
         arguments: ints and floats are passed as int and float, arrays as their buffers. moved: the
         bytes that must be read and written, for the profile; by default those of all arrays. alone:
         on a processor, every work-item is a work-group: PoCL otherwise keeps the private arrays of
-        all the group's at once, which for large ones does not fit into the cache.
+        all the group's at once, which for large ones does not fit into the cache. group:
+        work-items in x of a work-group, for a kernel that is written for one number of them.
         """
-        group = 1 if alone and self.on_cpu else self.work_group
+        group = group or (1 if alone and self.on_cpu else self.work_group)
         local = (group, *(1 for _ in size[1:]))
         padded = tuple(math.ceil(n / m) * m for n, m in zip(size, local, strict=True))
         event = self._kernel(name, file, defines)(

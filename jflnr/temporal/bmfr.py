@@ -46,9 +46,9 @@ class History(NamedTuple):
     """What a frame leaves to the next.
 
     number: how many frames there were, `()`. surface: of the last one; its depth is 0 where nothing
-    can be taken over. count: samples in `light`, `(H, W, 1)`, whole numbers. light: the accumulated noisy light,
-    fitted: the accumulated fitted light, picture: of that, multiplied by albedo, the result of TAA;
-    all `(H, W, 3)`.
+    can be taken over. count: samples in `light`, `(H, W, 1)`, whole numbers. light: the accumulated
+    noisy light, fitted: the accumulated fitted light, picture: of that, multiplied by albedo, the
+    result of TAA; all `(H, W, 3)`.
     """
 
     number: jax.Array
@@ -123,17 +123,20 @@ def covered(frame: Frame) -> Array:
 
 
 def features(frame: Frame) -> jax.Array:
-    """Normal and position, `(H, W, 6)`.
+    """Normal and position, `(H, W, 6)`."""
+    return jnp.concatenate([frame.normal, position(frame)], axis=-1)
 
-    Without a position, that relative to the camera, up to a factor that scaling takes out.
+
+def position(frame: Frame) -> Array:
+    """The frame's position, `(H, W, 3)`.
+
+    If it has none, that relative to the camera, but for factors that the scaling takes out.
     """
-    position = frame.position
-    if position is None:
-        height, width = frame.depth.shape[:2]
-        y, x = jnp.mgrid[:height, :width] + 0.5
-        centred = jnp.stack([x - width / 2, y - height / 2, jnp.ones_like(x)], axis=-1)
-        position = centred * frame.depth
-    return jnp.concatenate([frame.normal, position], axis=-1)
+    if frame.position is not None:
+        return frame.position
+    height, width = frame.depth.shape[:2]
+    y, x = jnp.mgrid[:height, :width] + 0.5
+    return frame.depth * jnp.stack([x - width / 2, y - height / 2, jnp.ones_like(x)], axis=-1)
 
 
 def accumulate_light(

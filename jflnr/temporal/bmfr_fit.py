@@ -124,7 +124,7 @@ def uniform(number: Any, rows: int, columns: int, block: int, count: int) -> jax
     pixels = rows * columns * block * block
     counter = jnp.arange(pixels * count, dtype=jnp.uint32).reshape(-1, block * block, count)
     bits = pcg(counter ^ pcg(jnp.asarray(number).astype(jnp.uint32)))
-    return (bits >> 8).astype(jnp.float32) * jnp.float32(2**-23) - 1
+    return (bits >> 9).astype(jnp.float32) * jnp.float32(2**-22) - 1
 
 
 def pcg(value: jax.Array) -> jax.Array:

@@ -1,0 +1,74 @@
+"""Host side of kernels_cl/bmfr/fit.cl and weighted_sum.cl; the twin is temporal/bmfr_fit.py."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from jflnr.opencl.context import Context
+from jflnr.opencl.moments import guide_arguments, guide_defines
+
+CHANNELS = 3
+# Of the matrix [T, z]: 1, six features, three squares and the light.
+COLUMNS = 10 + CHANNELS
+SCALED = 9
+
+
+def fit(
+    context: Context,
+    light: Any,
+    count: Any,
+    surface: Any,
+    features: tuple[Any, Any],
+    number: int,
+    offset: Sequence[int],
+    block: int,
+    noise: float,
+) -> Any:
+    """Phase II: `jflnr.temporal.bmfr_fit.fit` of normal and position with its squares, not below 0.
+
+    light: `(H, W, 3)`. count: `(H, W, 1)`, samples in it. surface: `(H, W, 1)`, above 0 where there
+    is one. features: normal and position, `(H, W, 3)` each. All are device arrays. The rest as
+    there. Returns `(H, W, 3)`.
+    """
+    height, width = light.shape[:2]
+    y, x = (int(at) for at in offset)
+    h, w = -(-(height + y) // block), -(-(width + x) // block)
+    lanes = context.width(block)
+    defines = {**guide_defines(features, CHANNELS), "BLOCK": block, "WIDTH": lanes}
+    reached = context.empty((h, w, SCALED, 2))
+    alpha = context.empty((h, w, COLUMNS - CHANNELS, CHANNELS))
+    guides = guide_arguments(features)
+    workers = 1 if context.on_cpu else _power_of_two(context)
+    matrix = COLUMNS * block * block
+    scratch: list[Any] = []
+    extra = {"WORKERS": workers}
+    if 4 * (matrix + COLUMNS * (workers + COLUMNS)) > context.device.local_mem_size:
+        extra["SCRATCH_GLOBAL"] = 1
+        scratch = [context.empty((h, w, matrix))]
+    context.run(
+        "fit",
+        "bmfr/fit.cl",
+        defines | extra,
+        (workers * w, h),
+        (
+            width, height, number, x, y, noise, light, count, surface, *guides, *scratch, reached,
+            alpha,
+        ),
+        group=workers,
+    )  # fmt: skip
+    fitted = context.empty(light.shape)
+    context.run(
+        "weighted_sum",
+        "bmfr/weighted_sum.cl",
+        defines,
+        (w * block // lanes, height),
+        (width, height, w, x, y, surface, *guides, reached, alpha, fitted),
+    )
+    return fitted
+
+
+def _power_of_two(context: Context) -> int:
+    """The largest power of two that a work-group may have, of at most 256."""
+    most = min(context.work_group, context.device.max_work_group_size)
+    return 1 << (most.bit_length() - 1)
