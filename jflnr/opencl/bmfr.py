@@ -30,20 +30,19 @@ def step(
     parameters: BmfrParameters = PAPER,
     *,
     context: Context | None = None,
-    out: Any | None = None,
     on_device: bool = False,
 ) -> tuple[History, Any]:
     """`jflnr.temporal.bmfr.step` on an OpenCL device: same arguments, same result.
 
     history: from `start` or the frame before, its arrays on the device. The layers of the frame,
     of numpy, JAX or on the device, are read again in the next step and must not change before.
-    context, out and on_device: as in `jflnr.opencl.flr`.
+    context and on_device: as in `jflnr.opencl.flr`.
 
     Raises `ValueError` for a layer of the wrong shape; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
     bmfr.check(frame)
-    output, result = to_output(context, frame.indirect.shape, out, on_device)
+    output, result = to_output(context, frame.indirect.shape, None, on_device)
     layers = {
         "sample": frame.indirect,
         "motion": bmfr.motion(frame),
@@ -53,8 +52,14 @@ def step(
         "surface": frame.depth if frame.mask is None else frame.mask,
         "albedo": frame.albedo,
     }
-    device = {name: to_device(context, layer) for name, layer in layers.items()}
-    following = _step(context, history, parameters, device, frame.position is None, output)
+    layers = {name: to_device(context, layer) for name, layer in layers.items()}
+    depths = frame.position is None
+    light, count, accepted = accumulate_light(context, history, layers, parameters, depths)
+    fitted = fit(context, light, count, layers, history.number, parameters.block, parameters.noise)
+    mean, picture = accumulate_fitted(context, history, layers, parameters, fitted, count, accepted)
+    smooth = taa(context, history, layers, parameters, picture, mean, output)
+    surface = Surface(layers["normal"], layers["depth"], layers["position"])
+    following = History(history.number + 1, surface, count, light, mean, smooth)
     return following, context.finish(output, result)
 
 
@@ -65,64 +70,87 @@ def to_device(context: Context, layer: Any) -> Any:
     return context.array(np.require(layer, np.float32, ["C", "ALIGNED"]))
 
 
-def _step(
+def accumulate_light(
     context: Context,
     history: History,
-    parameters: BmfrParameters,
     layers: dict[str, Any],
+    parameters: BmfrParameters,
     depths: bool,
-    image: Any,
-) -> History:
-    """The three phases; writes `image`. depths: tell surfaces apart by depth."""
-    height, width = image.shape[:2]
-    size, offset = (width, height), bmfr.grid_offset(history.number, parameters.block)
-    light, count, accepted = accumulate_light(
-        context, history, layers, parameters.light_share, depths
-    )
-    fitted = fit(
-        context,
-        light,
-        count,
-        layers["surface"],
-        (layers["normal"], layers["position"]),
-        history.number,
-        offset,
-        parameters.block,
-        parameters.noise,
-    )
-    mean, picture, shown = (context.empty(image.shape) for _ in range(3))
-    arguments = (
-        *size, parameters.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
-        history.fitted, mean, picture,
-    )  # fmt: skip
-    context.run("accumulate_fitted", "bmfr/accumulate_fitted.cl", {}, size, arguments)
-    share = 1.0 if history.number == 0 else parameters.picture_share
-    arguments = (
-        *size, share, DARK, picture, history.picture, layers["motion"], layers["albedo"],
-        layers["surface"], mean, shown, image,
-    )  # fmt: skip
-    context.run("taa", "bmfr/taa.cl", {}, size, arguments)
-    surface = Surface(layers["normal"], layers["depth"], layers["position"])
-    return History(history.number + 1, surface, count, light, mean, shown)
-
-
-def accumulate_light(
-    context: Context, history: History, layers: dict[str, Any], least: float, depths: bool
 ) -> tuple[Any, Any, Any]:
     """Phase I: mean of the samples at each place; see `jflnr.temporal.bmfr.accumulate_light`.
 
-    Returns the mean `(H, W, 3)`, the number of samples `(H, W, 1)`, and a bit for every accepted
-    tap, `(H, W)`.
+    depths: tell surfaces apart by depth. Returns the mean `(H, W, 3)`, the number of samples
+    `(H, W, 1)`, and a bit for every accepted tap, `(H, W)`.
     """
     height, width = layers["sample"].shape[:2]
     light, count = context.empty((height, width, 3)), context.empty((height, width, 1))
     accepted = context.empty((height, width), np.uint8)
     before = history.surface
     arguments = (
-        width, height, OFF_PLANE, SAME_NORMAL, least, layers["sample"], layers["motion"],
+        OFF_PLANE, SAME_NORMAL, parameters.light_share, layers["sample"], layers["motion"],
         layers["normal"], layers["depth"], layers["position"], before.normal, before.depth,
         before.position, history.count, history.light, light, count, accepted,
     )  # fmt: skip
-    defines = {"DEPTHS": 1} if depths else {}
-    context.run("accumulate_light", "bmfr/accumulate_light.cl", defines, (width, height), arguments)
+    defines = {"MOST": bmfr.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
+    run_on_rows(context, "accumulate_light", (width, height), arguments, defines)
     return light, count, accepted
+
+
+def accumulate_fitted(
+    context: Context,
+    history: History,
+    layers: dict[str, Any],
+    parameters: BmfrParameters,
+    fitted: Any,
+    count: Any,
+    accepted: Any,
+) -> tuple[Any, Any]:
+    """Phase III: mean of the fitted light, `(H, W, 3)`, and that times albedo, `(3, H, W)`."""
+    height, width = fitted.shape[:2]
+    mean, picture = context.empty(fitted.shape), context.empty((3, height, width))
+    arguments = (
+        parameters.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
+        history.fitted, mean, picture,
+    )  # fmt: skip
+    run_on_rows(context, "accumulate_fitted", (width, height), arguments)
+    return mean, picture
+
+
+def taa(
+    context: Context,
+    history: History,
+    layers: dict[str, Any],
+    parameters: BmfrParameters,
+    picture: Any,
+    mean: Any,
+    image: Any,
+) -> Any:
+    """Phase III: the smoothed picture, `(H, W, 3)`; writes `image`, the same without albedo."""
+    height, width = mean.shape[:2]
+    share = 1.0 if history.number == 0 else parameters.picture_share
+    smooth = context.empty(mean.shape)
+    arguments = (
+        share, DARK, picture, history.picture, layers["motion"], layers["albedo"],
+        layers["surface"], mean, smooth, image,
+    )  # fmt: skip
+    run_on_rows(context, "taa", (width, height), arguments)
+    return smooth
+
+
+def run_on_rows(
+    context: Context,
+    name: str,
+    size: tuple[int, int],
+    arguments: tuple[Any, ...],
+    defines: dict[str, int] | None = None,
+) -> None:
+    """Enqueue kernels_cl/bmfr/`name`.cl over vectors of neighbours, which may overlap.
+
+    size: width and height of the frame.
+    """
+    width, height = size
+    lanes = context.width() if width >= context.width() else 1
+    channels = {"Q": 6, "C": 3, "PART_0": 3, "PART_1": 3, "PART_2": 0, "PART_3": 0, "PART_4": 0}
+    defines = {**channels, "WIDTH": lanes, **(defines or {})}
+    groups = -(-width // lanes), height
+    context.run(name, f"bmfr/{name}.cl", defines, groups, (width, height, *arguments))

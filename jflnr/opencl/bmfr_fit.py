@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from jflnr.opencl.context import Context
 from jflnr.opencl.moments import guide_arguments, guide_defines
+from jflnr.temporal.bmfr_fit import grid_offset
 
 CHANNELS = 3
 # Of the matrix [T, z]: 1, six features, three squares and the light.
@@ -18,19 +18,19 @@ def fit(
     context: Context,
     light: Any,
     count: Any,
-    surface: Any,
-    features: tuple[Any, Any],
+    layers: dict[str, Any],
     number: int,
-    offset: Sequence[int],
     block: int,
     noise: float,
 ) -> Any:
     """Phase II: `jflnr.temporal.bmfr_fit.fit` of normal and position with its squares, not below 0.
 
-    light: `(H, W, 3)`. count: `(H, W, 1)`, samples in it. surface: `(H, W, 1)`, above 0 where there
-    is one. features: normal and position, `(H, W, 3)` each. All are device arrays. The rest as
-    there. Returns `(H, W, 3)`.
+    light: `(H, W, 3)`. count: `(H, W, 1)`, samples in it. layers: normal and position, `(H, W, 3)`,
+    and surface, `(H, W, 1)`, above 0 where there is one. All are device arrays. The rest as there.
+    Returns `(H, W, 3)`.
     """
+    features, surface = (layers["normal"], layers["position"]), layers["surface"]
+    offset = grid_offset(number, block)
     height, width = light.shape[:2]
     y, x = (int(at) for at in offset)
     h, w = -(-(height + y) // block), -(-(width + x) // block)

@@ -21,6 +21,8 @@ from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
 
 # Below this albedo the light cannot be told from the picture.
 DARK = 1e-3
+# What a byte holds; by then a new sample's share has long been its least.
+MOST_SAMPLES = 255
 
 
 class BmfrParameters(NamedTuple):
@@ -149,7 +151,7 @@ def accumulate_light(
     was none.
     """
     usable = jnp.all(jnp.isfinite(light), axis=-1, keepdims=True)
-    count = jnp.round(gather(taps, history.count)) + usable
+    count = jnp.minimum(jnp.round(gather(taps, history.count)) + usable, MOST_SAMPLES)
     share = jnp.where(usable, jnp.maximum(1 / jnp.maximum(count, 1), least), 0)
     before = gather(taps, history.light)
     return before + share * (jnp.where(usable, light, 0) - before), count

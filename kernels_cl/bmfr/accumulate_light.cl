@@ -1,29 +1,37 @@
 // BMFR, phase I: the mean of the noisy samples at each place, with an age limit (Koskela et al. 2019,
 // section 3.2).
 //
-// Define: DEPTHS, if the frames have no position; surfaces are then told apart by their depth.
+// Defines beside those of the headers: DEPTHS, if the frames have no position; surfaces are then told
+// apart by their depth. MOST, the largest count.
 
-#define WIDTH 1
 #include "vectors.h"
+#include "sizes.h"
+#include "images.h"
 #include "bmfr/taps.h"
 
-// Whether two pixels show one surface, see `_alike` in jflnr/temporal/reproject.py.
-INLINE int alike(
-    float3 normal, float3 position, float depth, float3 normal_there, float3 position_there,
-    float depth_there, float tolerance, float same_normal)
+#define DOT(a, b) ((a)[0] * (b)[0] + (a)[1] * (b)[1] + (a)[2] * (b)[2])
+
+typedef struct {
+    real normal[3], position[3], depth;
+} Surface;
+
+// Whether two pixels show one surface: see `_alike` in jflnr/temporal/reproject.py.
+INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal)
 {
 #ifdef DEPTHS
-    const float apart = depth_there - depth;
+    const real apart = there.depth - here.depth;
 #else
-    const float apart = DOT(normal, position_there - position);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) there.position[c] -= here.position[c];
+    const real apart = DOT(here.normal, there.position);
 #endif
-    const int turned = DOT(normal, normal_there) < same_normal;
-    return fabs(apart) <= tolerance && !turned && depth > 0 && depth_there > 0;
+    const mask turned = DOT(here.normal, there.normal) < same_normal;
+    return (ABS(apart) <= tolerance) & (turned == 0) & (here.depth > 0) & (there.depth > 0);
 }
 
-// Global size (W, H). All images (H, W, 3), but motion (H, W, 2), depth, count and accepted (H, W).
-// before_...: of the previous frame; where its count is 0 nothing is taken from it. accepted: bit i for
-// tap i, for phase III.
+// Global size (W / WIDTH, H). All images (H, W, 3), but motion (H, W, 2), depth, count and accepted
+// (H, W). before_...: of the previous frame; where its count is 0 nothing is taken from it. accepted:
+// bit i for tap i, for phase III.
 kernel void accumulate_light(
     int width, int height, float off_plane, float same_normal, float least,
     global const float *sample, global const float *motion, global const float *normal,
@@ -32,38 +40,55 @@ kernel void accumulate_light(
     global const float *before_count, global const float *before_light, global float *light,
     global float *count, global uchar *accepted)
 {
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= width || y >= height) return;
+    const int x = FIRST_PIXEL(width), y = get_global_id(1);
+    if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
     const long pixel = (long)y * width + x;
-    motion += 2 * pixel;
-    Taps taps = find_taps(motion, x, y, width, height);
-    const float3 here = vload3(pixel, normal), point = vload3(pixel, position);
-    const float moved = MAX(fabs(motion[0]), fabs(motion[1])) / width;
-    const float tolerance = (off_plane + moved) * depth[pixel];
-    int bits_of = 0;
+    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
+    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
+
+    Surface here;
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+        here.normal[c] = OWN(normal, 3, c);
+        here.position[c] = OWN(position, 3, c);
+    }
+    here.depth = READ(depth + pixel);
+    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
+    const real tolerance = (off_plane + moved) * here.depth;
+    mask accepts = 0;
+    real samples = 0;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        if (!(taps.weight[i] > 0)) continue;
-        const long tap = TAP(taps, i);
-        const int accept =
-            before_count[tap] > 0 && alike(
-                                         here, point, depth[pixel], vload3(tap, before_normal),
-                                         vload3(tap, before_position), before_depth[tap],
-                                         tolerance, same_normal);
-        taps.weight[i] = accept ? taps.weight[i] : 0;
-        bits_of |= accept << i;
-    }
-    normalise(&taps);
-    float samples = 0;
+        Surface there;
 #pragma unroll
-    for (int i = 0; i < 4; ++i)
-        if (taps.weight[i] > 0) samples += taps.weight[i] * before_count[TAP(taps, i)];
+        for (int c = 0; c < 3; ++c) {
+            there.normal[c] = at(before_normal, 3, c, taps.pixel[i]);
+            there.position[c] = at(before_position, 3, c, taps.pixel[i]);
+        }
+        there.depth = at(before_depth, 1, 0, taps.pixel[i]);
+        const real known = at(before_count, 1, 0, taps.pixel[i]);
+        const mask accept =
+            alike(here, there, tolerance, same_normal) & (known > 0) & (taps.weight[i] > 0);
+        taps.weight[i] = accept ? taps.weight[i] : (real)0;
+        accepts |= accept ? (mask)(1 << i) : (mask)0;
+        samples += taps.weight[i] * known;
+    }
+    const real total = normalise(&taps);
+    samples = nearest(samples / (total > 0 ? total : (real)1));
 
-    const float3 own = vload3(pixel, sample), mean = gather(before_light, &taps, width);
-    const int usable = FINITE(own);
-    samples = rint(samples) + usable;
-    const float share = MAX(1 / MAX(samples, 1), least);
-    vstore3(usable ? mean + share * (own - mean) : mean, pixel, light);
-    count[pixel] = samples;
-    accepted[pixel] = bits_of;
+    real own[3], mean[3];
+#pragma unroll
+    for (int c = 0; c < 3; ++c) own[c] = OWN(sample, 3, c);
+    const mask usable = 0 * own[0] + 0 * own[1] + 0 * own[2] == 0;
+    samples = MIN(samples + (usable ? (real)1 : (real)0), MOST);
+    const real weight = 1 / MAX(samples, 1), share = MAX(weight, least);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+        mean[c] = gather(before_light, 3, c, &taps);
+        mean[c] += usable ? share * (own[c] - mean[c]) : (real)0;
+    }
+    write_pixels(light + pixel * 3, mean, 0, WIDTH - 1);
+    WRITE(samples, count + pixel);
+#define WRITE_BITS(i) accepted[pixel + (i)] = LANE(accepts, i)
+    (void)LANES(mask, WRITE_BITS);
 }

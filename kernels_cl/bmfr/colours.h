@@ -1,13 +1,17 @@
-// Luma, orange and green, and back without loss.
+// From red, green and blue to luma, orange and green, and back without loss. Comes after vectors.h.
 
-INLINE float3 to_ycocg(float3 c)
+INLINE void to_ycocg(real *v)
 {
-    return (float3)(
-        0.25f * c.x + 0.5f * c.y + 0.25f * c.z, 0.5f * (c.x - c.z),
-        0.5f * c.y - 0.25f * c.x - 0.25f * c.z);
+    const real r = v[0], g = v[1], b = v[2];
+    v[0] = 0.25f * r + 0.5f * g + 0.25f * b;
+    v[1] = 0.5f * r - 0.5f * b;
+    v[2] = 0.5f * g - 0.25f * r - 0.25f * b;
 }
 
-INLINE float3 to_rgb(float3 c)
+INLINE void to_rgb(real *v)
 {
-    return (float3)(c.x + c.y - c.z, c.x + c.z, c.x - c.y - c.z);
+    const real luma = v[0], orange = v[1], green = v[2];
+    v[0] = luma + orange - green;
+    v[1] = luma + green;
+    v[2] = luma - orange - green;
 }

@@ -1,56 +1,80 @@
 // The four pixels of the previous frame around the place where a pixel was; the twin of
-// jflnr/temporal/reproject.py. Comes after vectors.h, with WIDTH 1.
+// jflnr/temporal/reproject.py. Comes after images.h.
+//
+// A work-item handles WIDTH neighbours of a row. The last ones of a row overlap those before, so that
+// every vector is full; the host sees to it that WIDTH is at most the width of the frame.
 
-// Left upper of the four, and their bilinear weights: (0, 0), (1, 0), (0, 1), (1, 1) in x, y. Where the
-// motion (two floats) is not finite, or leads outside the frame, the weights are 0.
+#define FIRST_PIXEL(width) MIN((int)get_global_id(0) * WIDTH, (width) - WIDTH)
+// Channel c of a frame's own pixels, and channel c at any pixels (a `mask` of whole numbers).
+#define OWN(image, stride, c) target_lanes((image) + pixel * (stride), stride, c, 0, WIDTH - 1)
+#define ONE_OF(i) image[LANE(pixels, i) * stride + c]
+INLINE real at(global const float *image, int stride, int c, mask pixels)
+{
+    return LANES(real, ONE_OF);
+}
+
+// Exact below 2^22.
+#define MAGIC 12582912.0f
+INLINE real nearest(real v) { return (v + MAGIC) - MAGIC; }
+INLINE real round_down(real v) { return nearest(v) - (nearest(v) > v ? (real)1 : (real)0); }
+#if WIDTH == 1
+#define AS_WHOLE as_int
+#elif WIDTH == 4
+#define AS_WHOLE as_int4
+#else
+#define AS_WHOLE as_int8
+#endif
+INLINE mask to_whole(real v) { return AS_WHOLE(v + MAGIC) - 0x4b400000; }
+#define ABS(v) MAX(v, -(v))
+
+// In the order (0, 0), (1, 0), (0, 1), (1, 1) of x, y. Where the motion is not finite, or a tap lies
+// outside the frame, its weight is 0 and its pixel any.
 typedef struct {
-    int x, y;
-    float weight[4];
+    mask pixel[4];
+    real weight[4];
 } Taps;
 
-#define TAP(taps, i) ((long)((taps).y + (i) / 2) * width + (taps).x + (i) % 2)
-
-INLINE Taps find_taps(global const float *motion, int x, int y, int width, int height)
+INLINE Taps find_taps(real motion_x, real motion_y, int x0, int y, int width, int height)
 {
     Taps taps;
-    const int known = 0 * motion[0] == 0 && 0 * motion[1] == 0;
+    const mask known = (0 * motion_x == 0) & (0 * motion_y == 0);
+    real x = LANES(real, LANE_NUMBER) + x0 + (known ? motion_x : (real)0);
+    real row = y + (known ? motion_y : (real)0);
     // Far outside there is nothing, and no whole number for it.
-    const float there_x = CLAMP(x + motion[0], -2.0f, width + 1.0f);
-    const float there_y = CLAMP(y + motion[1], -2.0f, height + 1.0f);
-    const float left = floor(there_x), top = floor(there_y);
-    taps.x = known ? (int)left : 0;
-    taps.y = known ? (int)top : 0;
+    x = CLAMP(x, (real)-2, (real)(width + 1));
+    row = CLAMP(row, (real)-2, (real)(height + 1));
+    const real left = round_down(x), top = round_down(row);
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const int column = taps.x + i % 2, row = taps.y + i / 2;
-        const int inside = column >= 0 && column < width && row >= 0 && row < height;
-        const float share =
-            (1 - fabs(there_x - (left + i % 2))) * (1 - fabs(there_y - (top + i / 2)));
-        taps.weight[i] = known && inside ? share : 0;
+        const real tap_x = left + i % 2, tap_y = top + i / 2;
+        const mask inside =
+            (tap_x >= 0) & (tap_x < width) & (tap_y >= 0) & (tap_y < height) & known;
+        const real share = (1 - ABS(x - tap_x)) * (1 - ABS(row - tap_y));
+        const mask pixel = to_whole(tap_y) * width + to_whole(tap_x);
+        taps.weight[i] = inside ? share : (real)0;
+        taps.pixel[i] = inside ? pixel : (mask)0;
     }
     return taps;
 }
 
-// Divides the weights by their sum, unless that is 0.
-INLINE float normalise(Taps *taps)
+// Divides the weights by their sum, which is returned, unless it is 0.
+INLINE real normalise(Taps *taps)
 {
-    float total = 0;
+    const real total = taps->weight[0] + taps->weight[1] + taps->weight[2] + taps->weight[3];
+    const real divisor = total > 0 ? total : (real)1;
 #pragma unroll
-    for (int i = 0; i < 4; ++i) total += taps->weight[i];
-#pragma unroll
-    for (int i = 0; i < 4; ++i) taps->weight[i] /= total > 0 ? total : 1;
+    for (int i = 0; i < 4; ++i) taps->weight[i] /= divisor;
     return total;
 }
 
-// The mean of three channels over the taps; one of weight 0 may hold anything.
-INLINE float3 gather(global const float *image, const Taps *taps, int width)
+// The mean over the taps; one of weight 0 may hold anything.
+INLINE real gather(global const float *image, int stride, int c, const Taps *taps)
 {
-    float3 mean = 0;
+    real mean = 0;
 #pragma unroll
-    for (int i = 0; i < 4; ++i)
-        if (taps->weight[i] > 0) mean += taps->weight[i] * vload3(TAP(*taps, i), image);
+    for (int i = 0; i < 4; ++i) {
+        const real part = taps->weight[i] * at(image, stride, c, taps->pixel[i]);
+        mean += taps->weight[i] > 0 ? part : (real)0;
+    }
     return mean;
 }
-
-#define DOT(a, b) ((a).x * (b).x + (a).y * (b).y + (a).z * (b).z)
-#define FINITE(v) (0 * (v).x == 0 && 0 * (v).y == 0 && 0 * (v).z == 0)
