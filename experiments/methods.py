@@ -61,8 +61,9 @@ def ours() -> list[Method]:
     """`jflnr.denoise`, every method on every backend that is there."""
     found = []
     for backend in backends():
-        # The kernels are those of plain FLR.
-        for method in jflnr.METHODS if backend == "jax" else ("flr",):
+        # The kernels are those of plain FLR. BMFR is a peer.
+        names = [method for method in jflnr.METHODS if method != "bmfr"]
+        for method in names if backend == "jax" else ("flr",):
             name = method if backend == "jax" else f"{method} ({backend})"
             parameters = {"method": method, "backend": backend}
             found.append(Method(name, "jflnr", jflnr.denoise, parameters, backend == "jax"))

@@ -21,7 +21,7 @@ from jflnr.inputs import adaptive_images, coarse_block, factor_of, flr_images, p
 
 # Pixels on a side that share one model: the size the paper found to lose nothing.
 BLOCK = 8
-METHODS = ("flr", "flr-adaptive", *flnr.METHODS)
+METHODS = ("flr", "flr-adaptive", *flnr.METHODS, "bmfr", "auto")
 SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 BACKENDS = ("jax", "opencl")
 
@@ -42,8 +42,10 @@ def denoise(
     frame: as from `read_frame`. Its `indirect` may have any number of channels C: several light
     groups side by side are denoised together, and their results sum to the denoised sum. It may
     also be smaller than the other layers by a whole factor; the result then has their size.
-    method: `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md) or `flnr`, the same
-    steered by a small network (docs/flnr.md).
+    method: `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`, the same
+    steered by a small network (docs/flnr.md), `bmfr`, as in the first frame of a sequence
+    (docs/bmfr.md), which takes neither guides nor any of the options below, or `auto`, the smallest
+    model that is good enough for the frame (docs/select.md).
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao. parameters: of the method, for flnr weights from `flnr.weights.load`; the
     fitted defaults if None.
@@ -60,7 +62,24 @@ def denoise(
     checks.choice("method", method, METHODS)
     checks.choice("backend", backend, BACKENDS)
     checks.positive_integer("block", block)
+    if method == "bmfr":
+        if guides is not None or block != BLOCK or keep_energy or tile is not None:
+            raise ValueError(
+                "method bmfr has its own features and blocks; guides, block, keep_energy and tile "
+                "are for other methods"
+            )
+        prepare(frame, ("normal", "depth"))
+        return _denoise_bmfr(frame, parameters, backend)
     names, inputs = prepare(frame, guides)
+    if method == "auto":
+        if backend != "jax" or block != BLOCK or tile is not None or parameters is not None:
+            raise ValueError(
+                "method auto finds its own block and parameters, and runs on the jax backend, in "
+                "one piece; flr and flr-adaptive also run on opencl and in tiles"
+            )
+        from jflnr.selection.method import select_inputs
+
+        return select_inputs(inputs, names, keep_energy=keep_energy)[1]
     if method in flnr.METHODS:
         if backend != "jax" or block != BLOCK or tile is not None:
             raise ValueError(
@@ -136,6 +155,17 @@ def _pad(frame: Frame, block: int) -> Frame:
         return np.pad(layer, [*margins, (0, 0)], constant_values=np.nan)
 
     return jax.tree.map(pad, frame)
+
+
+def _denoise_bmfr(frame: Frame, parameters: Any, backend: str) -> Array:
+    from jflnr.temporal import bmfr
+
+    parameters = _parameters(parameters, bmfr.PAPER)
+    if backend == "opencl":
+        from jflnr.opencl import bmfr as kernels
+
+        return kernels.step(kernels.start(frame), frame, parameters)[1]
+    return bmfr.step(bmfr.start(frame), frame, parameters)[1]
 
 
 def _parameters(given: Any, default: Any) -> Any:
