@@ -87,9 +87,9 @@ def accumulate_light(
     accepted = context.empty((height, width), np.uint8)
     before = history.surface
     arguments = (
-        OFF_PLANE, SAME_NORMAL, parameters.light_share, layers["sample"], layers["motion"],
-        layers["normal"], layers["depth"], layers["position"], before.normal, before.depth,
-        before.position, history.count, history.light, light, count, accepted,
+        OFF_PLANE, SAME_NORMAL, parameters.light_share, layers["sample"], layers["surface"],
+        layers["motion"], layers["normal"], layers["depth"], layers["position"], before.normal,
+        before.depth, before.position, history.count, history.light, light, count, accepted,
     )  # fmt: skip
     defines = {"MOST": bmfr.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
     run_on_rows(context, "accumulate_light", (width, height), arguments, defines)
@@ -127,11 +127,10 @@ def taa(
 ) -> Any:
     """Phase III: the smoothed picture, `(H, W, 3)`; writes `image`, the same without albedo."""
     height, width = mean.shape[:2]
-    share = 1.0 if history.number == 0 else parameters.picture_share
     smooth = context.empty(mean.shape)
     arguments = (
-        share, DARK, picture, history.picture, layers["motion"], layers["albedo"],
-        layers["surface"], mean, smooth, image,
+        parameters.picture_share, DARK, picture, history.picture, history.count, layers["motion"],
+        layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
     run_on_rows(context, "taa", (width, height), arguments)
     return smooth

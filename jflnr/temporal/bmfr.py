@@ -84,7 +84,8 @@ def step(
     check(frame)
     moved, inside = motion(frame), covered(frame)
     taps = find_taps(moved, Surface.of(frame), history.surface)
-    light, count = accumulate_light(taps, history, frame.indirect, parameters.light_share)
+    sample = jnp.where(inside, frame.indirect, jnp.nan)
+    light, count = accumulate_light(taps, history, sample, parameters.light_share)
     fitted = fit(
         jnp.where(count > 0, light, jnp.nan),
         features(frame),
@@ -96,9 +97,8 @@ def step(
         squares=3,
     )
     fitted = accumulate_fitted(taps, history, fitted, count, parameters.fitted_share)
-    first = history.number == 0
-    share = jnp.where(first, 1, parameters.picture_share)
-    picture = smooth(frame.albedo * fitted, history.picture, moved, share)
+    known = history.count > 0
+    picture = smooth(frame.albedo * fitted, history.picture, known, moved, parameters.picture_share)
     bright = inside & (frame.albedo > DARK)
     image = jnp.where(bright, picture / jnp.where(bright, frame.albedo, 1), fitted)
     # A pixel without a sample so far has nothing to hand on.

@@ -15,21 +15,27 @@ CROSS = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
-def smooth(picture: jax.Array, before: jax.Array, motion: Array, share: Array) -> jax.Array:
+def smooth(
+    picture: jax.Array, before: jax.Array, known: Array, motion: Array, share: Array
+) -> jax.Array:
     """The picture mixed with its predecessor, which is first brought into the range around it.
 
     picture: `(H, W, 3)`. before: the result of the previous frame, read bilinearly where each pixel
-    was. motion: `(H, W, 2)`, pixels to there. share: of the new picture; where it shows what was
-    outside before, or whose motion is not known, it is taken as it is.
+    was. known: `(H, W, 1)` boolean, which pixels of that count; the others, such as the sky, are no
+    part of this picture. motion: `(H, W, 2)`, pixels to there. share: of the new picture; where
+    nothing is known from before, it is taken as it is.
     Returns `(H, W, 3)`.
     """
     place = where_it_was(motion)
     was_there = inside(place, picture.shape[:2])[..., None]
     place = jnp.where(was_there[..., 0], place, 0)
     read = lambda channel: map_coordinates(channel, list(place), order=1, mode="nearest")
-    history = jnp.stack([read(before[..., c]) for c in range(3)], axis=-1) @ jnp.array(YCOCG).T
+    counted = jnp.concatenate([jnp.where(known, before, 0), known], axis=-1)
+    *sums, weight = (read(counted[..., c]) for c in range(4))
+    was_there &= weight[..., None] > 0
+    history = jnp.stack(sums, axis=-1) / jnp.where(was_there, weight[..., None], 1)
     colour = picture @ jnp.array(YCOCG).T
-    history = jnp.clip(history, *neighbourhood(colour))
+    history = jnp.clip(history @ jnp.array(YCOCG).T, *neighbourhood(colour))
     mixed = history + share * (colour - history)
     return jnp.where(was_there, mixed @ jnp.array(RGB).T, picture)
 

@@ -29,12 +29,12 @@ INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal
     return (ABS(apart) <= tolerance) & (turned == 0) & (here.depth > 0) & (there.depth > 0);
 }
 
-// Global size (W / WIDTH, H). All images (H, W, 3), but motion (H, W, 2), depth, count and accepted
-// (H, W). before_...: of the previous frame; where its count is 0 nothing is taken from it. accepted:
-// bit i for tap i, for phase III.
+// Global size (W / WIDTH, H). All images (H, W, 3), but motion (H, W, 2), surface, depth, count
+// and accepted (H, W). surface: above 0 where samples count. before_...: of the previous frame; where
+// its count is 0 nothing is taken from it. accepted: bit i for tap i, for phase III.
 kernel void accumulate_light(
     int width, int height, float off_plane, float same_normal, float least,
-    global const float *sample, global const float *motion, global const float *normal,
+    global const float *sample, global const float *surface, global const float *motion, global const float *normal,
     global const float *depth, global const float *position, global const float *before_normal,
     global const float *before_depth, global const float *before_position,
     global const float *before_count, global const float *before_light, global float *light,
@@ -79,7 +79,8 @@ kernel void accumulate_light(
     real own[3], mean[3];
 #pragma unroll
     for (int c = 0; c < 3; ++c) own[c] = OWN(sample, 3, c);
-    const mask usable = 0 * own[0] + 0 * own[1] + 0 * own[2] == 0;
+    const mask usable =
+        (0 * own[0] + 0 * own[1] + 0 * own[2] == 0) & (READ(surface + pixel) > 0);
     samples = MIN(samples + (usable ? (real)1 : (real)0), MOST);
     const real weight = 1 / MAX(samples, 1), share = MAX(weight, least);
 #pragma unroll

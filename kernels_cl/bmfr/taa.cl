@@ -37,11 +37,11 @@ INLINE void neighbourhood(
 }
 
 // Global size (W / WIDTH, H). picture: (3, H, W), from accumulate_fitted. before: (H, W, 3), the previous
-// result. surface: (H, W). result: (H, W, 3). image: the same divided by albedo, or, where that is at
+// result, whose pixels count where before_count, (H, W), is above 0. surface: (H, W). result: (H, W, 3). image: the same divided by albedo, or, where that is at
 // most `dark`, the mean of phase III.
 kernel void taa(
     int width, int height, float share, float dark, global const float *picture,
-    global const float *before, global const float *motion, global const float *albedo,
+    global const float *before, global const float *before_count, global const float *motion, global const float *albedo,
     global const float *surface, global const float *mean, global float *result,
     global float *image)
 {
@@ -52,7 +52,13 @@ kernel void taa(
     const real there_x = LANES(real, LANE_NUMBER) + x + motion_x, there_y = y + motion_y;
     const mask was_inside =
         (there_x >= 0) & (there_x <= width - 1) & (there_y >= 0) & (there_y <= height - 1);
-    const Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
+    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
+#pragma unroll
+    for (int i = 0; i < 4; ++i) {
+        const real known = at(before_count, 1, 0, taps.pixel[i]);
+        taps.weight[i] = known > 0 ? taps.weight[i] : (real)0;
+    }
+    const mask was_there = was_inside & (normalise(&taps) > 0);
 
     real shown[3], old[3], image_of[3];
 #pragma unroll
@@ -63,7 +69,7 @@ kernel void taa(
         real low, high;
         neighbourhood(picture + c * plane, x, y, width, height, &low, &high);
         const real own = READ(picture + c * plane + pixel), held = CLAMP(old[c], low, high);
-        shown[c] = was_inside ? held + share * (own - held) : own;
+        shown[c] = was_there ? held + share * (own - held) : own;
     }
     to_rgb(shown);
     write_pixels(result + pixel * 3, shown, 0, WIDTH - 1);

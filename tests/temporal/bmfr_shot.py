@@ -6,7 +6,7 @@ import numpy as np
 
 from jflnr.frame import Frame
 
-STEP = np.array([1.25, -0.5], np.float32)
+STEP = np.array([-1.25, 0.5], np.float32)
 
 
 def shot(frames: int, height: int, width: int, *, noise: bool = True) -> list[Frame]:
