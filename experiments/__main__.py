@@ -31,6 +31,8 @@ NAMES = (
     "complexity",
     "error_map",
     "large",
+    "sequences",
+    "sequence_speed",
 )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
-from jflnr.metrics import display, exposure, measure
+from jflnr.metrics import display, exposure, psnr, ssim, unbiased_mse
 from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -29,8 +29,10 @@ _find_taps = jax.jit(find_taps)
 
 
 def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[dict]:
-    """Metrics of every frame: those of `measure`, `temporal_error` and `warped_error`.
+    """`psnr`, `psnr_unbiased`, `ssim`, `temporal_error` and `warped_error` of every frame.
 
+    psnr_unbiased leaves out the noise of the references (`jflnr.metrics.unbiased_mse`, on displayed
+    pictures); None without half references, and where nothing else is left.
     lights: demodulated indirect light `(H, W, 3)` of each frame. The first frame has no errors in
     time. Raises ValueError for a frame without a reference or, from the second on, motion.
     """
@@ -39,12 +41,26 @@ def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[d
     if any(frame.reference is None for frame in frames):
         raise ValueError("every frame needs a layer reference to measure against")
     scale = sequence_exposure(frames)
-    rows = [measure(*pair) for pair in zip(frames, lights, strict=True)]
+    rows = [_measure(frame, light, scale) for frame, light in zip(frames, lights, strict=True)]
     for i in range(1, len(frames)):
         pair = (frames[i - 1], frames[i]), (lights[i - 1], lights[i])
         rows[i]["temporal"] = temporal_error(*pair, scale)
         rows[i]["warped"] = warped_error(*pair, scale)
     return rows
+
+
+def _measure(frame: Frame, light: Array, scale: float) -> dict[str, float | None]:
+    shown, true = (_displayed(frame, image, scale) for image in (light, frame.reference))
+    error = None
+    if frame.reference_a is not None and frame.reference is not None:
+        half_b = 2 * np.asarray(frame.reference, np.float64) - frame.reference_a
+        halves = (_displayed(frame, half, scale) for half in (frame.reference_a, half_b))
+        error = unbiased_mse(shown, *halves)
+    return {
+        "psnr": psnr(shown, true),
+        "psnr_unbiased": None if error is None or error <= 0 else float(-10 * np.log10(error)),
+        "ssim": ssim(shown, true),
+    }
 
 
 def sequence_exposure(frames: Sequence[Frame]) -> float:
@@ -137,7 +153,7 @@ def recovery(frames: Sequence[Frame], lights: Sequence[Array]) -> dict[str, floa
     """
     scale, errors = sequence_exposure(frames), []
     for frame, light in zip(frames, lights, strict=True):
-        shown = [display(_reflected(frame, image), scale) for image in (light, frame.reference)]
+        shown = [_displayed(frame, image, scale) for image in (light, frame.reference)]
         errors.append(np.mean((shown[0] - shown[1]) ** 2, axis=-1))
     error, age = np.stack(errors), ages(frames)
     inside = np.stack(
@@ -154,9 +170,13 @@ def _reflected(frame: Frame, light: Array | None) -> np.ndarray:
     return np.asarray(frame.albedo, np.float64) * np.asarray(light, np.float64)
 
 
+def _displayed(frame: Frame, light: Array | None, scale: float) -> np.ndarray:
+    return display(_reflected(frame, light), scale)
+
+
 def _shown(frame: Frame, light: Array, scale: float) -> np.ndarray:
     """Luminance of the displayed picture, `(H, W)`."""
-    return display(_reflected(frame, light), scale) @ LUMINANCE
+    return _displayed(frame, light, scale) @ LUMINANCE
 
 
 def _squares(images: np.ndarray) -> np.ndarray:

@@ -66,6 +66,19 @@ def test_what_was_not_in_view_does_not_count() -> None:
     assert row["warped"] < 1e-6 and row["psnr"] < 30
 
 
+def test_the_noise_of_the_reference_can_be_left_out() -> None:
+    rng = np.random.default_rng(3)
+    frame, truth = shot([0])[0], shot([0])[0].reference
+    half_a, half_b = (truth * (1 + 0.1 * rng.standard_normal(truth.shape)) for _ in range(2))
+    noisy = dataclasses.replace(frame, reference=(half_a + half_b) / 2, reference_a=half_a)
+    light = truth * (1 + 0.05 * rng.standard_normal(truth.shape))
+    row = temporal_metrics.measure_sequence([noisy], [light])[0]
+    known = temporal_metrics.measure_sequence([frame], [light])[0]
+    assert known["psnr_unbiased"] is None
+    assert row["psnr_unbiased"] == pytest.approx(known["psnr"], abs=0.3)
+    assert row["psnr"] < known["psnr"] - 1
+
+
 @pytest.mark.parametrize("delay", [0, 3, 2.5])
 def test_lag_of_a_delayed_sequence(delay: float) -> None:
     time = np.arange(LENGTH)

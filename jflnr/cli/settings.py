@@ -10,7 +10,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     from jflnr.denoising import BACKENDS, BLOCK, METHODS
     from jflnr.flr import parameters
 
-    checks.choice("--method", arguments.method, tuple(dict.fromkeys((*METHODS, "bmfr"))))
+    checks.choice("--method", arguments.method, METHODS)
     checks.choice("--backend", arguments.backend, BACKENDS)
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
+import importlib
 import itertools
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jflnr import checks
 from jflnr.cli.frames import Denoised, Denoiser, Light, Loaded, Record, failure
 from jflnr.cli.jobs import Job, natural
 from jflnr.cli.pipeline import pipelined
@@ -38,8 +41,13 @@ def wanted(arguments: argparse.Namespace) -> bool:
     for name, alone in (("error_map", False), ("profile", False), ("block", None)):
         if getattr(arguments, name) != alone:
             raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
-    if arguments.backend != "jax":
-        raise ValueError("shots are denoised on the jax backend: leave --backend out")
+    from jflnr.temporal.sequence import METHODS
+
+    checks.choice("--method, of a shot,", arguments.method, (*METHODS, "bmfr"))
+    if arguments.backend != "jax" and (arguments.method != "bmfr" or arguments.history):
+        raise ValueError(
+            "shots are denoised on the jax backend, but for --method bmfr without --history"
+        )
     return True
 
 
@@ -158,24 +166,15 @@ class _Running:
         return denoised, self.state
 
     def _step(self, frame: Frame) -> tuple[Any, np.ndarray]:
-        from jflnr import temporal
-        from jflnr.temporal import bmfr
-
-        settings = self.denoiser.settings
-        own = settings["method"] == "bmfr"
-        state = self.state
-        if state is None:
-            state = bmfr.start(frame) if own else temporal.start(frame)
-            if self.before is not None:
-                state = self.before.state(state)
+        start, step = _functions(self.denoiser.settings)
+        if self.state is not None:
+            state = self.state
+        else:
+            state = start(frame) if self.before is None else self.before.state(start(frame))
         if frame.motion is None:
             warnings.warn(UNKNOWN_MOTION, stacklevel=1)
             frame = dataclasses.replace(frame, motion=np.zeros((*frame.depth.shape[:2], 2)))
-        if own:
-            state, image = bmfr.step(state, frame)
-        else:
-            options = {name: settings[name] for name in ("method", "guides", "parameters")}
-            state, image = temporal.step(state, frame, **options)
+        state, image = step(state, frame)
         return state, np.asarray(image, np.float32)
 
     def write(self, done: tuple[Denoised | Record, Any]) -> Record:
@@ -197,6 +196,18 @@ class _Running:
             }
             history.write(self.history, state, about)
         return record
+
+
+def _functions(settings: dict[str, Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """What makes the first state, and what denoises the next frame."""
+    if settings["method"] == "bmfr":
+        backend = "jflnr.opencl" if settings["backend"] == "opencl" else "jflnr.temporal"
+        bmfr = importlib.import_module(f"{backend}.bmfr")
+        return bmfr.start, bmfr.step
+    from jflnr import temporal
+
+    own = {name: settings[name] for name in ("method", "guides", "parameters")}
+    return temporal.start, functools.partial(temporal.step, **own)
 
 
 def _options(arguments: argparse.Namespace) -> dict[str, str]:

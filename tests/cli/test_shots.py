@@ -168,6 +168,7 @@ Refusal = Callable[[Path, Path], list[object]]
         (lambda shot, state: [shot, "--history", shot / NAMES[0]], "not a history"),
         (lambda shot, state: [shot, "--block", "4"], "--block"),
         (lambda shot, state: [shot, "--backend", "opencl"], "jax backend"),
+        (lambda shot, state: [shot, "--method", "auto"], "flr-adaptive"),
         (lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal"], "--guides"),
         (lambda shot, state: [shot, shot.parent / "b", "--history", state], "one shot"),
     ],

@@ -1,0 +1,179 @@
+"""Every method on sequences: BMFR's Tables 2 and 3 on our frames, lag and recovery."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments import plots, results, resume, shots
+from jflnr import temporal_metrics
+from jflnr.frame import Frame
+
+NAME = "sequences"
+QUESTION = "Who is stable over time and stays near the truth, whatever moves?"
+
+SETTLED = 8  # frames after which means over a sequence begin
+REFERENCE = "reference"
+QUICK = ("flr", "flr, temporal", "BMFR")
+TABLES = {
+    "psnr": "PSNR in dB, mean from frame 8 on",
+    "psnr_unbiased": "The same without the noise of the references",
+    "warped": "warped temporal error x 1000, mean from frame 8 on",
+    "ssim": "SSIM, mean of all frames (BMFR, Table 2)",
+    "rmse": "RMSE of the displayed picture, mean of all frames (BMFR, Table 2)",
+    "temporal": "temporal error, mean of all frames (BMFR, Table 3)",
+    "lag": "lag in frames, under a moving and after a switched light",
+}
+PER_FRAME = ("psnr", "ssim", "temporal", "warped")
+MARGIN = {"flnr": "FLNR frame by frame", "BMFR": "BMFR", "SVGF": "SVGF"}
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Metrics of each method on each sequence."""
+    names = ["made up"] if quick else shots.names()
+    methods = {m.name: m for m in shots.methods() if not quick or m.name in QUICK}
+    keys = [f"{name}|{method}" for name in names for method in (REFERENCE, *methods)]
+
+    def row(key: str) -> dict[str, Any]:
+        name, method = key.split("|")
+        shot = shots.load(name)
+        about = {"shot": shot.name, "motion": shot.motion, "split": shot.split, "method": method}
+        if method == REFERENCE:
+            lights = [np.asarray(frame.reference) for frame in shot.frames]
+            return about | {"family": REFERENCE} | of_reference(shot.frames, lights)
+        lights = methods[method].run(shot.frames)
+        return about | {"family": methods[method].family} | measured(shot, lights)
+
+    rows = resume.rows(f"{NAME}{'-quick' * quick}", keys, row)
+    return {"rows": rows, "margins": margins(rows)}
+
+
+def of_reference(frames: tuple[Frame, ...], lights: list[np.ndarray]) -> dict[str, Any]:
+    """The errors in time that the references have, by true change and by their own noise."""
+    found = temporal_metrics.measure_sequence(frames, lights)[1:]
+    return {key: float(np.mean([row[key] for row in found])) for key in ("temporal", "warped")}
+
+
+def measured(shot: shots.Shot, lights: list[np.ndarray]) -> dict[str, Any]:
+    """Means, the course of each metric, and how a method follows the light and what comes up."""
+    frames = temporal_metrics.measure_sequence(shot.frames, lights)
+    course: dict[str, Any] = {key: [frame.get(key) for frame in frames] for key in PER_FRAME}
+    rmse = [10 ** (-frame["psnr"] / 20) for frame in frames]
+    found: dict[str, Any] = {
+        "psnr": float(np.mean(course["psnr"][SETTLED:])),
+        "psnr_unbiased": mean([frame["psnr_unbiased"] for frame in frames[SETTLED:]]),
+        "warped": float(np.mean(course["warped"][SETTLED:])),
+        "ssim": float(np.mean(course["ssim"])),
+        "rmse": float(np.mean(rmse)),
+        "temporal": float(np.mean(course["temporal"][1:])),
+        "course": course,
+    }
+    mask = stack([frame.mask for frame in shot.frames])
+    images, truth = (mask * stack(some) for some in (lights, [f.reference for f in shot.frames]))
+    if shot.motion == "light":
+        found["lag"] = temporal_metrics.lag(images, truth)
+    if shot.motion == "switch":
+        found["response"] = temporal_metrics.response(images, truth[0], truth[-1]).tolist()
+        found["lag"] = float(np.sum(1 - np.array(found["response"][len(truth) // 2 :])))
+    if shot.motion in ("camera", "object"):
+        found["recovery"] = temporal_metrics.recovery(shot.frames, lights)
+    return found
+
+
+def stack(images: Sequence[Any]) -> np.ndarray:
+    """Images of all frames, `(T, H, W, C)`."""
+    return np.stack([np.asarray(image) for image in images])
+
+
+def mean(values: list[float | None]) -> float | None:
+    """The mean, or None if one of the values is missing."""
+    found = [value for value in values if value is not None]
+    return float(np.mean(found)) if len(found) == len(values) else None
+
+
+def margins(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """How each of our methods with a history compares with others, sequence by sequence."""
+    by = {(row["shot"], row["method"]): row for row in rows}
+    found = []
+    for row in rows:
+        if row["family"] != "ours":
+            continue
+        line = {"shot": row["shot"], "method": row["method"]}
+        for other, title in MARGIN.items():
+            if (theirs := by.get((row["shot"], other))) is not None:
+                line[f"PSNR above {title}"] = row["psnr"] - theirs["psnr"]
+                line[f"warped error below {title}, times"] = theirs["warped"] / row["warped"]
+                if "lag" in row:
+                    line[f"lag / {title}'s"] = row["lag"] / theirs["lag"] if theirs["lag"] else None
+        found.append(line)
+    return found
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """sequences_figures.md; sequences.png: PSNR and flicker over frames; sequences_lag.png."""
+    rows = result["rows"]
+    parts = [f"{title}\n\n{table(rows, key)}" for key, title in TABLES.items()]
+    parts.append(f"Places that came into view: PSNR in dB by frames since\n\n{recoveries(rows)}")
+    plots.write_text(folder / f"{NAME}_figures.md", "\n".join(parts))
+    courses(rows, folder / f"{NAME}.png")
+    if any("response" in row for row in rows):
+        responses(rows, folder / f"{NAME}_lag.png")
+
+
+def table(rows: list[dict[str, Any]], key: str) -> str:
+    """One metric: methods down, sequences across."""
+    lines: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        if row.get(key) is not None:
+            value = row[key] * (1000 if key == "warped" else 1)
+            lines.setdefault(row["method"], {"method": row["method"]})[row["shot"]] = value
+    names = list(dict.fromkeys(row["shot"] for row in rows if row.get(key) is not None))
+    columns = {"method": "method"} | {name: name.replace("_", ", ") for name in names}
+    return results.table(list(lines.values()), columns)
+
+
+def recoveries(rows: list[dict[str, Any]]) -> str:
+    """PSNR by age, on the sequences where something comes into view."""
+    ages = list(temporal_metrics.AGES)
+    lines = [
+        {"shot": row["shot"].replace("_", ", "), "method": row["method"]} | row["recovery"]
+        for row in rows
+        if "recovery" in row
+    ]
+    return results.table(
+        lines, {"shot": "sequence", "method": "method"} | {age: age for age in ages}
+    )
+
+
+def courses(rows: list[dict[str, Any]], path: Path) -> None:
+    """PSNR above, warped temporal error below, frame by frame; one column for each sequence."""
+    names = list(dict.fromkeys(row["shot"] for row in rows))
+    with plots.figure(path, len(names), (3.4, 3), rows=2) as axes:
+        for column, name in enumerate(names):
+            top, bottom = axes[column], axes[column + len(names)]
+            for row in (row for row in rows if row["shot"] == name and "course" in row):
+                style = {"ours": "-", "alone": ":", "peer": "--"}[row["family"]]
+                top.plot(row["course"]["psnr"], style, label=row["method"])
+                warped = [1000 * value for value in row["course"]["warped"][1:]]
+                bottom.semilogy(range(1, len(warped) + 1), warped, style)
+            top.set_title(name.replace("_", ", "))
+            bottom.set_xlabel("frame")
+        axes[0].set_ylabel("PSNR, dB")
+        axes[len(names)].set_ylabel("warped temporal error x 1000")
+        axes[0].legend(fontsize=6)
+
+
+def responses(rows: list[dict[str, Any]], path: Path) -> None:
+    """How far the methods have followed a light that was switched half-way."""
+    found = [row for row in rows if "response" in row]
+    names = list(dict.fromkeys(row["shot"] for row in found))
+    with plots.figure(path, len(names), (5, 3.2)) as axes:
+        for axis, name in zip(np.atleast_1d(axes), names, strict=True):
+            for row in (row for row in found if row["shot"] == name):
+                style = {"ours": "-", "alone": ":", "peer": "--"}[row["family"]]
+                axis.plot(row["response"], style, label=row["method"])
+            axis.set(title=name.replace("_", ", "), xlabel="frame", ylabel="share of the change")
+            axis.legend(fontsize=6)

@@ -1,0 +1,129 @@
+"""Sequences to measure on, and every way to denoise one."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import jflnr
+from experiments import data
+from experiments.methods import oidn_peers
+from experiments.peers import svgf
+from jflnr import temporal
+from jflnr.cli.jobs import expand
+from jflnr.frame import Array, Frame
+from jflnr.temporal import bmfr, sequence
+
+Step = Callable[[Any, Frame], tuple[Any, Array]]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A sequence. motion: static, camera, light, switch or object. split: of its scene."""
+
+    name: str
+    scene: str
+    motion: str
+    split: str
+    frames: tuple[Frame, ...]
+
+
+def folder() -> Path:
+    """JFLNR_SEQUENCES, else where `render shots` puts them."""
+    default = Path(__file__).parents[1] / "cache" / "sequences"
+    return Path(os.environ.get("JFLNR_SEQUENCES", default))
+
+
+def names() -> list[str]:
+    """The sequences that are there; `made up` if there are none."""
+    found = sorted(path.parent.name for path in folder().glob("*/manifest.json"))
+    if not found:
+        print(f"No sequences in {folder()} (`render shots` makes them): using a made-up one.")
+    return found or ["made up"]
+
+
+@functools.lru_cache(maxsize=1)
+def load(name: str) -> Shot:
+    """The sequence of a name."""
+    if name == "made up":
+        return made_up()
+    paths = expand([folder() / name])
+    facts = jflnr.read_header(paths[0])
+    frames = tuple(data.read(path) for path in paths)
+    return Shot(name, facts["scene"], facts["motion"], facts["split"], frames)
+
+
+def made_up(length: int = 10, height: int = 48, width: int = 80) -> Shot:
+    """A window that slides over the frame that ships, with noise of its own in every frame."""
+    whole = data.read(data.SHIPPED)
+    frames = []
+    for i in range(length):
+        rows, columns = slice(90, 90 + height), slice(150 + 2 * i, 150 + 2 * i + width)
+        layers: dict[str, Any] = {
+            k: None if v is None else v[rows, columns] for k, v in vars(whole).items()
+        }
+        light = np.asarray(layers["reference"])
+        noise = np.random.default_rng(i).gamma(0.2, 5, (height, width, 1))
+        motion = np.full((height, width, 2), (2, 0), np.float32) * (i > 0)
+        frames.append(Frame(**layers | {"indirect": np.float32(light * noise), "motion": motion}))
+    return Shot("made up", "room", "camera", "train", tuple(frames))
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to denoise sequences. family: `ours`, `alone` for ours frame by frame, or `peer`."""
+
+    name: str
+    family: str
+    run: Callable[[Sequence[Frame]], list[np.ndarray]]
+
+
+def methods() -> list[Method]:
+    """Frame by frame, and with a history; ours and others'."""
+    alone = [
+        Method(m, "alone", functools.partial(each, functools.partial(jflnr.denoise, method=m)))
+        for m in ("flr", "flr-adaptive", "flnr")
+    ]
+    ours = [Method(f"{m}, temporal", "ours", with_history(m)) for m in sequence.METHODS]
+    peers = [
+        Method("BMFR", "peer", in_steps(bmfr.start, bmfr.step)),
+    ]
+    if hasattr(svgf, "step"):
+        peers.append(Method("SVGF", "peer", in_steps(svgf.start, svgf.step)))
+    oidn = [
+        Method("OIDN", "peer", functools.partial(each, denoise))
+        for denoise in oidn_peers()
+        if denoise.name == "OIDN, tuned"
+    ]
+    return [*alone, *ours, *peers, *oidn]
+
+
+def each(denoise: Callable[[Frame], Array], frames: Sequence[Frame]) -> list[np.ndarray]:
+    """Frame by frame, by a method that knows of no other frame."""
+    return [np.asarray(denoise(frame)) for frame in frames]
+
+
+def with_history(method: str) -> Callable[[Sequence[Frame]], list[np.ndarray]]:
+    """One of ours, over time."""
+    return in_steps(temporal.start, functools.partial(temporal.step, method=method))
+
+
+def in_steps(
+    start: Callable[[Frame], Any], step: Step
+) -> Callable[[Sequence[Frame]], list[np.ndarray]]:
+    """A method of a step function, from the first frame on."""
+
+    def run(frames: Sequence[Frame]) -> list[np.ndarray]:
+        state, lights = start(frames[0]), []
+        for frame in frames:
+            state, light = step(state, frame)
+            lights.append(np.asarray(light))
+        return lights
+
+    return run
