@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -42,17 +44,25 @@ def apply_rows(coefficients: jax.Array, guides: Guides, shift: jax.Array, block:
     moved = (lax.slice_in_dim(coefficients, k, k + size, axis=2) for k in range(3))
     grids = [jnp.moveaxis(grid, 2, 0) for grid in moved]
 
-    def strip(arrays: tuple[Guides, jax.Array, jax.Array, jax.Array]) -> jax.Array:
-        return _apply_strip(*arrays, shift=shift, block=block)
+    def strip(guides: Guides, grids: list[jax.Array]) -> jax.Array:
+        return _apply_strip(guides, *grids, shift=shift, block=block)
 
-    whole = jax.tree.map(lambda a: into_strips(a, block), guides)
-    image = lax.map(strip, (whole, *(grid[:rows] for grid in grids)))
-    image = image.reshape(rows * block, *image.shape[2:])
-    if height % block:
-        rest_guides = jax.tree.map(lambda a: a[rows * block :], guides)
-        rest = strip((rest_guides, *(grid[rows] for grid in grids)))
-        image = jnp.concatenate([image, rest])
-    return image
+    def strip_of(arrays: tuple[jax.Array, list[jax.Array]]) -> jax.Array:
+        first, grids = arrays
+        cut = functools.partial(lax.dynamic_slice_in_dim, start_index=first, slice_size=block)
+        return strip(jax.tree.map(cut, guides), grids)
+
+    inside = [grid[:rows] for grid in grids]
+    if height % block == 0:
+        whole = jax.tree.map(lambda a: into_strips(a, block), guides)
+        image = lax.map(lambda arrays: strip(*arrays), (whole, inside))
+        return image.reshape(height, *image.shape[2:])
+    rest = strip(jax.tree.map(lambda a: a[rows * block :], guides), [grid[rows] for grid in grids])
+    if not rows:
+        return rest
+    # Cut out one by one: the guides without their last rows would be a copy of them.
+    image = lax.map(strip_of, (jnp.arange(rows) * block, inside))
+    return jnp.concatenate([image.reshape(rows * block, *rest.shape[1:]), rest])
 
 
 def _apply_strip(

@@ -7,6 +7,8 @@ compiles in a fraction of the time that a factorisation written out takes.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,7 +19,7 @@ from jflnr.flr.moments import index_xx, index_xy
 # Roundings of a sum of squares that may add up.
 ROUNDING = 64
 # Blocks that are solved at a time.
-STRIP = 4096
+STRIP = 1024
 
 
 def solve_strips(
@@ -30,27 +32,56 @@ def solve_strips(
     """
     height, width = moments.shape[1:]
     rows = min(max(STRIP // width, 1), height)
-    planes = jnp.concatenate([moments, eps[None], eps_prime[None]])
-    planes = jnp.pad(planes, ((0, 0), (0, -height % rows), (0, 0)))
-    strips = jnp.moveaxis(planes.reshape(planes.shape[0], -1, rows, width), 1, 0)
-    models = lax.map(lambda strip: _solve(strip, shift, channels), strips)
-    models = jnp.moveaxis(models, 0, 2)
-    return models.reshape(*models.shape[:2], -1, width)[:, :, :height]
+    regular = jnp.stack([eps, eps_prime])
+
+    def solve_some(strip: jax.Array, models: jax.Array) -> jax.Array:
+        # The last strip ends with the grid; what it shares with the one before is the same.
+        first = jnp.minimum(strip * rows, height - rows)
+        some = [lax.dynamic_slice_in_dim(a, first, rows, axis=1) for a in (moments, regular)]
+        solved = _solve(*lax.optimization_barrier(some), shift, channels)
+        return lax.dynamic_update_slice_in_dim(models, solved, first, axis=2)
+
+    models = jnp.zeros((shift.size + 1, channels, height, width), moments.dtype)
+    return lax.fori_loop(0, -(-height // rows), solve_some, models)
 
 
-def _solve(planes: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
+def _solve(moments: jax.Array, regular: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
+    system = normal_equations(moments, shift, *regular, channels)
+    if not shift.size:
+        return system.mean_y[None]
+    both = jnp.concatenate([system.correlation, system.right], axis=1)
+    slopes = _eliminate(both) * system.scale[:, None]
+    value = system.mean_y - jnp.sum(system.mean_x[:, None] * slopes, axis=0)
+    return jnp.concatenate([value[None], slopes])
+
+
+class NormalEquations(NamedTuple):
+    """`correlation @ (slopes / scale) = right`, and the means that the models pass through.
+
+    correlation: `(Q, Q, h, w)`. right: `(Q, C, h, w)`. scale, mean_x: `(Q, h, w)`. mean_y:
+    `(C, h, w)`.
+    """
+
+    correlation: jax.Array
+    right: jax.Array
+    scale: jax.Array
+    mean_x: jax.Array
+    mean_y: jax.Array
+
+
+def normal_equations(
+    moments: jax.Array, shift: jax.Array, eps: jax.Array, eps_prime: jax.Array, channels: int
+) -> NormalEquations:
+    """Eq. 13 to 22; arguments as of `solve_strips`."""
     count = shift.size
-    moments, eps, eps_prime = planes[:-2], planes[-2], planes[-1]
     filled = moments[0] > 1e-12
     means = moments * jnp.where(filled, 1 / jnp.where(filled, moments[0], 1), 0)
     xx = (count + 1) * (count + 2) // 2
     mean_x = means[np.array([index_xx(i + 1, 0) for i in range(count)], int)]
     mean_y = means[index_xy(0, 0, count, channels) :][:channels]
-    if not count:
-        return mean_y[None]
-    pairs = np.array([[index_xx(i + 1, j + 1) for j in range(count)] for i in range(count)])
+    pairs = np.array([index_xx(i + 1, j + 1) for i, j in np.ndindex(count, count)], int)
     diagonal = jnp.eye(count, dtype=bool)[:, :, None, None]
-    covariance = means[pairs] - mean_x[:, None] * mean_x
+    covariance = means[pairs.reshape(count, count)] - mean_x[:, None] * mean_x
     covariance = jnp.where(diagonal, jnp.maximum(covariance, 0), covariance)
     mu = mean_x + shift[:, None, None].astype(means.dtype)
     outer = eps * mu[:, None] * mu
@@ -58,13 +89,11 @@ def _solve(planes: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
     rounding = ROUNDING * jnp.finfo(means.dtype).eps * (covariance + mean_x[:, None] * mean_x)
     regular = covariance + outer + jnp.where(diagonal, outer + eps_prime + rounding, 0)
 
-    scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)]))
+    scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)])) if count else mean_x
     correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)
     cross = means[xx + channels :].reshape(count, channels, *means.shape[1:])
     right = (cross - mean_x[:, None] * mean_y) * scale[:, None]
-    slopes = _eliminate(jnp.concatenate([correlation, right], axis=1)) * scale[:, None]
-    value = mean_y - jnp.sum(mean_x[:, None] * slopes, axis=0)
-    return jnp.concatenate([value[None], slopes])
+    return NormalEquations(correlation, right, scale, mean_x, mean_y)
 
 
 def _eliminate(system: jax.Array) -> jax.Array:

@@ -7,6 +7,7 @@ be blurred like an image. First the lower triangle of `[1, X] [1, X]^T` row by r
 
 from __future__ import annotations
 
+import functools
 from typing import TypeAlias
 
 import jax
@@ -101,6 +102,7 @@ def collect(
     shift: jax.Array,
     block: int,
     weight: jax.Array | None = None,
+    brightness: jax.Array | None = None,
 ) -> jax.Array:
     """Mean over each block of the outer products of [1, X - shift, Y] (section 3.2, kernel 1).
 
@@ -109,14 +111,15 @@ def collect(
 
     target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`, from `centre`. weight: `(H, W)`,
     numbers or a boolean mask, or None; pixels of weight 0, and any that are not finite, are left
-    out.
+    out. brightness: `(C,)`, weights of the channels; if given, the mean square of the brightness is
+    one more plane, the last.
     Returns `(K, ceil(H/block), ceil(W/block))`.
     """
     rows = target.shape[0] // block
     inputs = (target, guides, weight)
 
     def strip(arrays: tuple[jax.Array, Guides, jax.Array | None]) -> jax.Array:
-        return _strip_moments(*arrays, shift=shift, block=block)
+        return _strip_moments(*arrays, shift=shift, block=block, brightness=brightness)
 
     # Three rows of blocks stay in the cache while their products are formed, and keep cores busy;
     # where they do not divide the frame, one: a second program for the rest would compile longer.
@@ -141,6 +144,7 @@ def _strip_moments(
     *,
     shift: jax.Array,
     block: int,
+    brightness: jax.Array | None,
 ) -> jax.Array:
     """Moments of one row of blocks: `(rows, W, ...)` to `(K, w)`."""
     dtype = working_type(target, *jax.tree.leaves(guides))
@@ -165,9 +169,21 @@ def _strip_moments(
     for i in range(1, len(weighted)):
         products += [weighted[i], *(weighted[i] * x[j] for j in range(i))]
     products += [a * b for a in weighted for b in y]
+    if brightness is not None:
+        light = sum(
+            (b * plane for b, plane in zip(brightness, y, strict=True)), jnp.zeros_like(one)
+        )
+        products.append(one * light * (light * block**2))
     divided = np.arange(len(products)) >= len(weighted) * (len(weighted) + 1) // 2
     # Rows first: contiguous additions; then the columns, with an eighth of the data.
-    sums = jnp.stack([jnp.sum(product, axis=0) for product in products])
-    missing = -sums.shape[1] % block
-    sums = jnp.pad(sums, ((0, 0), (0, missing))).reshape(len(products), -1, block)
-    return jnp.sum(sums, axis=-1) * np.where(divided, 1, 1 / block**2).astype(dtype)[:, None]
+    sums = lax.optimization_barrier([jnp.sum(product, axis=0) for product in products])
+    sums = sum_columns(lax.optimization_barrier(jnp.stack(sums)), block)
+    return sums * np.where(divided, 1, 1 / block**2).astype(dtype)[:, None]
+
+
+def sum_columns(planes: jax.Array, block: int) -> jax.Array:
+    """Sums over every `block` columns: `(..., W)` to `(..., ceil(W / block))`."""
+    missing = -planes.shape[-1] % block
+    planes = jnp.pad(planes, [(0, 0)] * (planes.ndim - 1) + [(0, missing)])
+    # Whole columns at a time: short sums along the last axis would be taken one by one.
+    return functools.reduce(jnp.add, (planes[..., k::block] for k in range(block)))

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jflnr.flr.moments import Guides, from_shift, planes
+from jflnr.flr.moments import Guides, from_shift, planes, sum_columns
 
 
 def collect_weighted(
@@ -70,7 +70,5 @@ def _strip(
     products.append(squares)
     # Rows first: contiguous additions; then the columns, with fewer data.
     sums = [jnp.sum(p.reshape(-1, block, p.shape[1]), axis=1) for p in products]
-    together = lax.optimization_barrier(jnp.stack(sums))
-    together = jnp.pad(together, ((0, 0), (0, 0), (0, -weight.shape[1] % block)))
-    together = together.reshape(*together.shape[:2], -1, block)
-    return jnp.sum(together, axis=-1) / block**2
+    together = lax.optimization_barrier(jnp.stack(lax.optimization_barrier(sums)))
+    return sum_columns(together, block) / block**2
