@@ -90,6 +90,6 @@ kernel void accumulate_light(
     }
     write_pixels(light + pixel * 3, mean, 0, WIDTH - 1);
     WRITE(samples, count + pixel);
-#define WRITE_BITS(i) accepted[pixel + (i)] = LANE(accepts, i)
+#define WRITE_BITS(i) (accepted[pixel + (i)] = LANE(accepts, i))
     (void)LANES(mask, WRITE_BITS);
 }
