@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +17,34 @@ QUESTION = "Who is stable over time and stays near the truth, whatever moves?"
 
 SETTLED = 8  # frames after which means over a sequence begin
 REFERENCE = "reference"
-QUICK = ("flr", "flr, temporal", "BMFR")
+QUICK = ("flr", "flr, temporal")
 TABLES = {
     "psnr": "PSNR in dB, mean from frame 8 on",
     "psnr_unbiased": "The same without the noise of the references",
-    "warped": "warped temporal error x 1000, mean from frame 8 on",
+    "warped": "Warped temporal error x 1000, mean from frame 8 on",
     "ssim": "SSIM, mean of all frames (BMFR, Table 2)",
     "rmse": "RMSE of the displayed picture, mean of all frames (BMFR, Table 2)",
-    "temporal": "temporal error, mean of all frames (BMFR, Table 3)",
-    "lag": "lag in frames, under a moving and after a switched light",
+    "temporal": "Temporal error, mean of all frames (BMFR, Table 3)",
+    "lag": "Lag in frames, under a moving and after a switched light",
 }
 PER_FRAME = ("psnr", "ssim", "temporal", "warped")
-MARGIN = {"flnr": "FLNR frame by frame", "BMFR": "BMFR", "SVGF": "SVGF"}
+# What charts show, and how: a pattern and a colour.
+CHARTED = {
+    "flnr": (":", plots.COLOURS[6]),
+    "flr, temporal": ("-", plots.COLOURS[4]),
+    "flr-adaptive, temporal": ("-", plots.COLOURS[0]),
+    "flnr, temporal": ("-", plots.COLOURS[2]),
+    "BMFR": ("--", plots.COLOURS[1]),
+    "BMFR without TAA": ("-.", plots.COLOURS[1]),
+    "SVGF": ("--", plots.COLOURS[3]),
+    "OIDN": (":", plots.COLOURS[5]),
+}
+MARGIN = {
+    "flnr": "FLNR frame by frame",
+    "BMFR": "BMFR",
+    "BMFR without TAA": "BMFR without TAA",
+    "SVGF": "SVGF",
+}
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -113,14 +129,25 @@ def margins(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """sequences_figures.md; sequences.png: PSNR and flicker over frames; sequences_lag.png."""
+    """sequences_figures.md, and charts over frames: sequences.png (PSNR), _flicker and _lag."""
     rows = result["rows"]
-    parts = [f"{title}\n\n{table(rows, key)}" for key, title in TABLES.items()]
-    parts.append(f"Places that came into view: PSNR in dB by frames since\n\n{recoveries(rows)}")
-    plots.write_text(folder / f"{NAME}_figures.md", "\n".join(parts))
-    courses(rows, folder / f"{NAME}.png")
-    if any("response" in row for row in rows):
-        responses(rows, folder / f"{NAME}_lag.png")
+    parts = [
+        f"## {title}\n\n{table(rows, key)}"
+        for key, title in TABLES.items()
+        if any(key in row for row in rows)
+    ]
+    parts.append(f"## Ours with a history against others\n\n{compared(result['margins'])}")
+    parts.append(f"## PSNR in dB of places by frames since they came up\n\n{recoveries(rows)}")
+    title = "# Sequences: figures\n\n`python -m experiments run sequences --docs docs`\n\n"
+    plots.write_text(folder / f"{NAME}_figures.md", title + "\n".join(parts))
+    chart(rows, lambda row: row["course"]["psnr"], "PSNR, dB", folder / f"{NAME}.png")
+    flicker = lambda row: [None if v is None else 1000 * v for v in row["course"]["warped"]]
+    path = folder / f"{NAME}_flicker.png"
+    chart(rows, flicker, "warped temporal error x 1000", path, "log")
+    switched = [row for row in rows if "response" in row]
+    if switched:
+        path = folder / f"{NAME}_lag.png"
+        chart(switched, lambda row: row["response"], "share of the change of light", path)
 
 
 def table(rows: list[dict[str, Any]], key: str) -> str:
@@ -148,32 +175,32 @@ def recoveries(rows: list[dict[str, Any]]) -> str:
     )
 
 
-def courses(rows: list[dict[str, Any]], path: Path) -> None:
-    """PSNR above, warped temporal error below, frame by frame; one column for each sequence."""
+def compared(margins: list[dict[str, Any]]) -> str:
+    """Gains in PSNR, quotients of flicker and of lag."""
+    columns = {"shot": "sequence", "method": "method"}
+    columns |= {key: key for row in margins for key in row}
+    return results.table(margins, columns)
+
+
+def chart(
+    rows: list[dict[str, Any]],
+    values: Callable[[dict[str, Any]], list[float | None]],
+    label: str,
+    path: Path,
+    scale: str = "linear",
+) -> None:
+    """What `values` finds in a row, over frames; a panel for each sequence."""
     names = list(dict.fromkeys(row["shot"] for row in rows))
-    with plots.figure(path, len(names), (3.4, 3), rows=2) as axes:
-        for column, name in enumerate(names):
-            top, bottom = axes[column], axes[column + len(names)]
-            for row in (row for row in rows if row["shot"] == name and "course" in row):
-                style = {"ours": "-", "alone": ":", "peer": "--"}[row["family"]]
-                top.plot(row["course"]["psnr"], style, label=row["method"])
-                warped = [1000 * value for value in row["course"]["warped"][1:]]
-                bottom.semilogy(range(1, len(warped) + 1), warped, style)
-            top.set_title(name.replace("_", ", "))
-            bottom.set_xlabel("frame")
-        axes[0].set_ylabel("PSNR, dB")
-        axes[len(names)].set_ylabel("warped temporal error x 1000")
-        axes[0].legend(fontsize=6)
-
-
-def responses(rows: list[dict[str, Any]], path: Path) -> None:
-    """How far the methods have followed a light that was switched half-way."""
-    found = [row for row in rows if "response" in row]
-    names = list(dict.fromkeys(row["shot"] for row in found))
-    with plots.figure(path, len(names), (5, 3.2)) as axes:
-        for axis, name in zip(np.atleast_1d(axes), names, strict=True):
-            for row in (row for row in found if row["shot"] == name):
-                style = {"ours": "-", "alone": ":", "peer": "--"}[row["family"]]
-                axis.plot(row["response"], style, label=row["method"])
-            axis.set(title=name.replace("_", ", "), xlabel="frame", ylabel="share of the change")
-            axis.legend(fontsize=6)
+    columns = min(len(names), 3)
+    with plots.figure(path, columns, (4, 2.8), -(-len(names) // columns)) as axes:
+        panels = np.atleast_1d(axes)
+        for axis, name in zip(panels, names, strict=False):
+            for row in rows:
+                if row["shot"] == name and (style := CHARTED.get(row["method"])):
+                    found = np.array(values(row), float)
+                    axis.plot(found, style[0], color=style[1], label=row["method"])
+            axis.set(title=name.replace("_", ", "), yscale=scale)
+        for axis in panels[len(names) :]:
+            axis.remove()
+        panels[0].set_ylabel(label)
+        panels[0].legend(fontsize=6)

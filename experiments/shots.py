@@ -93,6 +93,7 @@ def methods() -> list[Method]:
     ours = [Method(f"{m}, temporal", "ours", with_history(m)) for m in sequence.METHODS]
     peers = [
         Method("BMFR", "peer", in_steps(bmfr.start, bmfr.step)),
+        Method("BMFR without TAA", "peer", in_steps(bmfr.start, without_taa)),
     ]
     if hasattr(svgf, "step"):
         peers.append(Method("SVGF", "peer", in_steps(svgf.start, svgf.step)))
@@ -102,6 +103,11 @@ def methods() -> list[Method]:
         if denoise.name == "OIDN, tuned"
     ]
     return [*alone, *ours, *peers, *oidn]
+
+
+def without_taa(history: bmfr.History, frame: Frame) -> tuple[bmfr.History, Array]:
+    """BMFR's step up to its last. TAA smooths the edges of textures, which the references have."""
+    return bmfr.step(history, frame, bmfr.PAPER._replace(picture_share=1.0))
 
 
 def each(denoise: Callable[[Frame], Array], frames: Sequence[Frame]) -> list[np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jflnr
-from experiments import data, results, resume
+from experiments import data, results, resume, shots
 from experiments.__main__ import main
 from experiments.lightgroups import error_of_sum, grouped
 from experiments.pareto import pareto_front
@@ -96,6 +96,29 @@ def test_quick_versions_leave_evidence_and_charts(name, tmp_path, monkeypatch):
     assert main(["report", "--out", str(tmp_path), "--docs", str(tmp_path / "docs")]) == 0
     assert f"{name}: rows" in (tmp_path / "report.html").read_text()
     assert (tmp_path / "docs" / f"{name}.md").read_text().startswith("| ")
+
+
+def test_sequences_are_measured_without_any_at_hand(tmp_path, monkeypatch):
+    monkeypatch.setattr(resume, "FOLDER", tmp_path / "cache")
+    assert main(["run", "sequences", "--quick", "--out", str(tmp_path)]) == 0
+    rows = json.loads((tmp_path / "sequences.json").read_bytes())["result"]["rows"]
+    found = {row["method"]: row for row in rows}
+    alone, over_time = found["flr"], found["flr, temporal"]
+    assert over_time["psnr"] > alone["psnr"] and over_time["warped"] < alone["warped"] / 2
+    assert found["reference"]["warped"] < 1e-6 < found["reference"]["temporal"]
+    assert "| made up | flr, temporal |" in (tmp_path / "sequences_figures.md").read_text()
+    assert (tmp_path / "sequences.png").stat().st_size > 10_000
+
+
+def test_a_made_up_sequence_moves_as_it_says():
+    """What `motion` leads to in the frame before is the same place, under other noise."""
+    before, now = shots.made_up(2).frames
+    x, y = now.motion[0, 0].astype(int)
+    assert (x, y) == (2, 0)
+    for name in ("position", "albedo", "reference"):
+        np.testing.assert_array_equal(getattr(now, name)[:, :-x], getattr(before, name)[:, x:])
+    assert not np.array_equal(now.indirect[:, :-x], before.indirect[:, x:])
+    assert now.indirect.mean() == pytest.approx(now.reference.mean(), rel=0.2)
 
 
 def test_every_experiment_says_what_it_asks(capsys):
