@@ -18,8 +18,8 @@ from jflnr.temporal.reproject import Taps, gather
 class Average(NamedTuple):
     """An image averaged over frames.
 
-    mean: `(H, W, C)`. samples: `(H, W, 1)`, of how many independent frames the mean has the variance;
-    0 where nothing is known, and the mean is 0.
+    mean: `(H, W, C)`. samples: `(H, W, 1)`, how many independent frames have a mean of the same
+    variance; 0 where nothing is known, and the mean is 0.
     """
 
     mean: jax.Array

@@ -1,8 +1,11 @@
-"""Denoising frame after frame: the one step function of the spatial methods (docs/temporal.md)."""
+"""Denoising frame after frame: one step function for the spatial methods (docs/temporal.md).
+
+The noisy light is averaged over time, the spatial method fits the average, and its results are
+averaged again. What the light has become since is found first and added to both averages.
+"""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -10,47 +13,53 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jflnr import checks
+from jflnr import checks, flnr
 from jflnr.denoising import support_of
-from jflnr.flr.adaptive import flr_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
-from jflnr.flr.parameters import DEFAULT, Parameters
+from jflnr.flr.adaptive import flr_adaptive, light_of
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
-from jflnr.frame import Frame
-from jflnr.inputs import adaptive_images, flr_images, prepare
+from jflnr.frame import Array, Frame
+from jflnr.inputs import adaptive_images, prepare
 from jflnr.temporal.accumulate import Average, accumulate, nothing, reproject
+from jflnr.temporal.change import Evidence, find_change, no_evidence
 from jflnr.temporal.reproject import Surface, find_taps
 
-METHODS = ("flr", "flr-adaptive")
+METHODS = ("flr", "flr-adaptive", *flnr.METHODS)
 
 
 class Temporal(NamedTuple):
-    """How much of the past is kept.
+    """How the past is kept.
 
-    light: least share of a new frame in the accumulated noisy light. image: that of a new fit in
-    the result.
+    light: least share of a new frame in the averaged noisy light. image: that of a new fit in the
+    averaged result. caution: how many times what noise explains a difference must be, before the
+    light is taken to have changed.
     """
 
-    light: jax.Array | float = 0.05
-    image: jax.Array | float = 0.3
+    light: float = 0.05
+    image: float = 0.3
+    caution: float = 2.5
 
 
 class State(NamedTuple):
-    """What one frame leaves to the next.
+    """What one frame leaves to the next, a pytree of arrays.
 
-    surface: what it showed. light: its noisy light, averaged over time. image: its result.
+    surface: what it showed. light: its noisy light, averaged over time. image: so is its result.
+    evidence: for a change of the light.
     """
 
     surface: Surface
     light: Average
     image: Average
+    evidence: Evidence
 
 
 def start(frame: Frame) -> State:
     """The state before the first frame, of which only the shapes count."""
+    checks.image("indirect", frame.indirect)
     size = frame.indirect.shape
     surface = jax.tree.map(lambda layer: jnp.zeros(layer.shape), Surface.of(frame))
-    return State(surface, nothing(*size), nothing(*size))
+    return State(surface, nothing(*size), nothing(*size), no_evidence(*size[:2]))
 
 
 def step(
@@ -59,73 +68,99 @@ def step(
     method: str = "flr-adaptive",
     *,
     guides: Sequence[str] | None = None,
-    parameters: Parameters | AdaptiveParameters | None = None,
+    parameters: Any = None,
     temporal: Temporal | None = None,
 ) -> tuple[State, jax.Array]:
     """Denoise the next frame of a sequence.
 
-    state: from `start` or from the frame before. frame: with `motion`; `camera_motion` gives it
-    where only the camera moves, and zeros say that nothing does. method: `flr` or `flr-adaptive`.
-    guides, parameters: as of `jflnr.denoise`.
+    state: from `start` or from the frame before. frame: with `motion`; where only the camera moves
+    `camera_motion` finds it, and zeros say that nothing does. The first frame's does not count.
+    method: one of `METHODS`. guides, parameters: as of `jflnr.denoise`.
     Returns the state for the next frame, and `(H, W, C)`, demodulated indirect radiance.
 
     Raises `ValueError` or `TypeError` naming the argument.
     """
     checks.choice("method", method, METHODS)
     names, inputs = prepare(frame, guides)
-    motion = _motion_of(frame)
-    checks.same_size(
-        motion=motion, indirect=frame.indirect, normal=frame.normal, state=state.light.mean
-    )
-    default: Any = ADAPTIVE_DEFAULT if method == "flr-adaptive" else DEFAULT
-    parameters = default if parameters is None else parameters
-    support = (
-        support_of(parameters, max(motion.shape[:2])) if isinstance(parameters, Parameters) else 1
-    )
-    return _step(
-        state, inputs, motion, Surface.of(frame), parameters, temporal or Temporal(), names, support
-    )
-
-
-def _motion_of(frame: Frame) -> Any:
     if frame.motion is None:
         raise ValueError(
-            "the frame has no layer motion, so it is not known where its pixels were one frame "
-            "ago: jflnr.temporal.camera_motion finds it from depth and two cameras, and an image "
-            "of zeros says that nothing moves"
+            "the frame has no layer motion, so nobody knows where its pixels were one frame ago: "
+            "jflnr.temporal.camera_motion finds it from depth and two cameras, and an image of "
+            "zeros says that nothing moves"
         )
     checks.image("motion", frame.motion, 2)
-    return frame.motion
+    checks.same_size(indirect=frame.indirect, normal=frame.normal, motion=frame.motion)
+    if state.light.mean.shape != frame.indirect.shape:
+        raise ValueError(
+            f"the state is of frames of shape {state.light.mean.shape}, and this frame's indirect "
+            f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
+        )
+    parameters = _default(method) if parameters is None else parameters
+    with jax.ensure_compile_time_eval():  # the width is a number also inside another's jit
+        support = support_of(parameters, max(frame.motion.shape)) if method == "flr" else 0
+    surface, temporal = Surface.of(frame), temporal or Temporal()
+    return _step(state, inputs, frame.motion, surface, parameters, temporal, method, names, support)
 
 
-@functools.partial(jax.jit, static_argnames=("names", "support"))
+def _default(method: str) -> Any:
+    if method in flnr.METHODS:
+        from jflnr.flnr import weights
+
+        return weights.shipped(method)
+    return DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
+
+
+@functools.partial(jax.jit, static_argnames=("method", "names", "support"))
 def _step(
     state: State,
     frame: Frame,
-    motion: jax.Array,
+    motion: Array,
     surface: Surface,
     parameters: Any,
     temporal: Temporal,
+    method: str,
     names: tuple[str, ...],
     support: int,
 ) -> tuple[State, jax.Array]:
+    images = adaptive_images(frame, names)
+    guides, mask = images["guides"], images["weight"]
     taps = find_taps(motion, surface, state.surface)
-    light = accumulate(reproject(state.light, taps), frame.indirect, temporal.light)
-    fitted = _fit(
-        dataclasses.replace(frame, indirect=light.mean), light.samples, parameters, names, support
+    light, image = reproject(state.light, taps), reproject(state.image, taps)
+    known = light.samples[..., 0] > 0
+    signal, share, evidence = find_change(
+        jnp.asarray(frame.indirect) - light.mean,
+        light_of(image.mean),
+        guides,
+        jnp.where(known if mask is None else known & mask, 1.0, 0.0),
+        state.evidence,
+        temporal.caution,
     )
-    image = accumulate(reproject(state.image, taps), fitted, temporal.image)
-    return State(surface, light, image), image.mean
+    light = accumulate(_changed(light, signal, share), frame.indirect, temporal.light)
+    weight = light.samples[..., 0] if mask is None else jnp.where(mask, light.samples[..., 0], 0)
+    fitted = _fit(light.mean, guides, weight, parameters, method, support)
+    image = accumulate(_changed(image, signal, share), fitted, temporal.image)
+    return State(surface, light, image, evidence), image.mean
+
+
+def _changed(average: Average, signal: jax.Array, share: jax.Array) -> Average:
+    """An average that follows the light. What is added has the noise of one frame."""
+    mean, n = average
+    return Average(jnp.where(n > 0, mean + signal, 0), n / (1 + share * n))
 
 
 def _fit(
-    frame: Frame, samples: jax.Array, parameters: Any, names: tuple[str, ...], support: int
+    target: jax.Array,
+    guides: tuple[jax.Array, ...],
+    weight: jax.Array,
+    parameters: Any,
+    method: str,
+    support: int,
 ) -> jax.Array:
-    """The spatial method, where a pixel weighs as much as the frames it has seen."""
-    adaptive = isinstance(parameters, AdaptiveParameters)
-    images = (adaptive_images if adaptive else flr_images)(frame, names)
-    there = images.pop("weight")
-    weight = samples[..., 0] if there is None else jnp.where(there, samples[..., 0], 0)
-    if adaptive:
-        return flr_adaptive(parameters=parameters, weight=weight, **images)
-    return flr(parameters=parameters, weight=weight, support=support, **images)
+    """The spatial method, for which a pixel counts as much as the frames that it has been seen."""
+    if method == "flr":
+        return flr(target, guides, parameters, weight=weight, support=support)
+    if method == "flr-adaptive":
+        return flr_adaptive(target, guides, parameters, weight=weight)
+    from jflnr.flnr import regression
+
+    return regression.flnr(target, guides, parameters, weight=weight)

@@ -1,0 +1,138 @@
+"""The step function: a window that slides over the frame that ships, with noise in every frame."""
+
+import dataclasses
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr import temporal
+from jflnr.denoising import SHIPPED_FRAME
+from jflnr.frame import Frame
+from jflnr.temporal import sequence
+
+HEIGHT, WIDTH = 48, 80
+NOISE = np.random.default_rng(0)
+
+
+@functools.cache
+def whole() -> Frame:
+    return jflnr.read_frame(SHIPPED_FRAME)
+
+
+def view(left: int, moved: int, light: float = 1.0) -> Frame:
+    """A part of the frame, `moved` pixels to the right of the last one, one sample per pixel."""
+    rows, columns = slice(90, 90 + HEIGHT), slice(150 + left, 150 + left + WIDTH)
+    frame = jax.tree.map(lambda layer: layer[rows, columns], whole())
+    reference = light * np.asarray(frame.reference, np.float32)
+    noise = NOISE.gamma(0.2, 5, (HEIGHT, WIDTH, 1)).astype(np.float32)
+    motion = np.full((HEIGHT, WIDTH, 2), (moved, 0), np.float32)
+    layers = {"indirect": reference * noise, "reference": reference, "motion": motion}
+    return dataclasses.replace(frame, **layers)
+
+
+def run(frames: list[Frame], method: str = "flr-adaptive") -> list[np.ndarray]:
+    state, images = temporal.start(frames[0]), []
+    for frame in frames:
+        state, image = temporal.step(state, frame, method)
+        images.append(np.asarray(image))
+    return images
+
+
+def error(frame: Frame, image: np.ndarray) -> float:
+    """Mean squared error of the light, relative to its square."""
+    return float(np.mean((image - frame.reference) ** 2) / np.mean(frame.reference**2))
+
+
+@pytest.fixture(scope="module")
+def pan() -> tuple[list[Frame], list[np.ndarray]]:
+    frames = [view(2 * i, 2 * (i > 0)) for i in range(10)]
+    return frames, run(frames)
+
+
+def test_the_first_frame_is_denoised_as_by_itself(pan: tuple) -> None:
+    frames, images = pan
+    alone = temporal.step(temporal.start(frames[5]), frames[5])[1]
+    again = temporal.step(temporal.start(frames[5]), frames[5], "flr-adaptive")[1]
+    np.testing.assert_array_equal(alone, again)
+    assert 0.5 < error(frames[5], np.asarray(alone)) / error(frames[0], images[0]) < 2
+
+
+def test_error_falls_under_a_moving_camera(pan: tuple) -> None:
+    frames, images = pan
+    assert error(frames[-1], images[-1]) < 0.5 * error(frames[0], images[0])
+
+
+def test_pictures_are_steady_under_a_moving_camera(pan: tuple) -> None:
+    """Moved along, adjacent frames differ far less than two that know nothing of each other."""
+    frames, images = pan
+    alone = [np.asarray(temporal.step(temporal.start(f), f)[1]) for f in frames[-2:]]
+
+    def flicker(before: np.ndarray, now: np.ndarray) -> float:
+        return float(np.mean(np.abs(now[:, :-2] - before[:, 2:])))
+
+    assert flicker(*images[-2:]) < flicker(*alone) / 5
+
+
+def test_a_switched_light_leaves_no_trail() -> None:
+    frames = [view(0, 0, light) for light in [1.0] * 6 + [2.5] * 3]
+    images = run(frames)
+    shown = [np.mean(image) for image in images]
+    assert shown[5] == pytest.approx(np.mean(frames[5].reference), rel=0.1)
+    assert shown[8] == pytest.approx(np.mean(frames[8].reference), rel=0.1)
+
+
+def test_the_unit_of_light_does_not_matter() -> None:
+    frames = [view(0, 0) for _ in range(3)]
+    bright = [dataclasses.replace(frame, indirect=1024 * frame.indirect) for frame in frames]
+    np.testing.assert_allclose(run(bright)[-1], 1024 * run(frames)[-1], rtol=1e-3, atol=1e-2)
+
+
+def test_nothing_is_compiled_twice() -> None:
+    frames = [view(0, 0) for _ in range(3)]
+    state, _ = temporal.step(temporal.start(frames[0]), frames[0])
+    programs = sequence._step._cache_size()
+    for frame in frames[1:]:
+        state, _ = temporal.step(state, frame)
+    assert sequence._step._cache_size() == programs
+
+
+def test_scan_is_the_loop_and_has_finite_gradients() -> None:
+    frames = [view(2 * i, 2 * (i > 0)) for i in range(3)]
+    together = jax.tree.map(lambda *layers: jnp.stack(layers), *frames)
+
+    def scanned(light: jax.Array) -> tuple[jax.Array, jax.Array]:
+        inputs = dataclasses.replace(together, indirect=light)
+        body = lambda state, frame: temporal.step(state, frame, "flr")
+        images = jax.lax.scan(body, temporal.start(frames[0]), inputs)[1]
+        return jnp.sum(images[-1]), images
+
+    program = jax.jit(jax.value_and_grad(scanned, has_aux=True))
+    (_, images), gradient = program(together.indirect)
+    np.testing.assert_allclose(images, run(frames, "flr"), rtol=1e-4, atol=1e-5)
+    assert np.isfinite(gradient).all()
+    # What the first frame held is in the last image.
+    assert np.count_nonzero(gradient[0]) > 0.9 * gradient[0].size
+
+
+def test_holes_are_filled_and_stay_finite() -> None:
+    frames = [view(0, 0) for _ in range(3)]
+    for frame in frames:
+        frame.indirect[10:14, 10:14] = np.nan
+    images = run(frames)
+    assert np.isfinite(images).all()
+    assert np.mean(images[-1][10:14, 10:14]) > 0
+
+
+def test_errors() -> None:
+    frame = view(0, 0)
+    state = temporal.start(frame)
+    with pytest.raises(ValueError, match="camera_motion finds it"):
+        temporal.step(state, dataclasses.replace(frame, motion=None))
+    with pytest.raises(ValueError, match="method must be one of flr"):
+        temporal.step(state, frame, "svgf")
+    with pytest.raises(ValueError, match="another size"):
+        temporal.step(state, jax.tree.map(lambda layer: layer[:40], frame))
