@@ -48,9 +48,9 @@ def save(path: Path, pictures: list[Image.Image]) -> None:
     """An endless GIF. One palette for all frames, or colours would flicker that do not."""
     palette = pictures[-1].quantize(128)
     frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    options = {"append_images": frames[1:], "duration": MILLISECONDS, "loop": 0}
+    first, *rest = frames
     with replacing(path) as beside:
-        frames[0].save(beside, save_all=True, **options)
+        first.save(beside, save_all=True, append_images=rest, duration=MILLISECONDS, loop=0)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,9 @@ where the input has it), and that light, demodulated, as the layer `indirect`.
 OUT is a file when IN is one file and OUT ends with .exr; otherwise it is a folder, and each output
 has its input's name. An output that exists is kept, which is no error, unless --overwrite is given.
 A frame that fails is reported, and the others are still done.
+
+With --temporal a folder is a shot: its frames are denoised in the order of their numbers, each with
+what the ones before it left.
 """
 
 import argparse
@@ -27,6 +30,7 @@ from jflnr.cli.summary import remarks, summary, throughput
 EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
   jflnr denoise render.exr -o out/ --direct --png --method flr-adaptive
+  jflnr denoise shot/ -o clean/ --temporal --method flr-adaptive      a film, without flicker
   jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with the clean ones
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
@@ -40,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
     add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
-    add("--method", default="flr", help="flr, flr-adaptive or flnr (flr)")
+    add("--method", default="flr", help="flr, flr-adaptive, flnr or bmfr (flr)")
     add("--backend", default="jax", help="what runs it: jax or opencl (jax)")
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--params", type=Path, metavar="FILE", help="what `jflnr fit` or `train` wrote")
