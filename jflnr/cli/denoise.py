@@ -126,13 +126,14 @@ def _records(
     denoiser: Denoiser, jobs: list[Job], arguments: argparse.Namespace
 ) -> Iterator[Record]:
     """What becomes of the frames, in the order in which they are finished."""
+    from jflnr import cluster
+
+    if arguments.cluster is not None:
+        # Workers on this machine share its memory.
+        at_once = 1 if arguments.cluster else cluster.cores()
+        denoiser = dataclasses.replace(denoiser, at_once=at_once, compiled=None)
     if shots.wanted(arguments):
         return shots.records(denoiser, jobs, arguments)
     if arguments.cluster is None:
         return pipelined(jobs, denoiser.read, denoiser.denoise, denoiser.write)
-    from jflnr import cluster
-
-    # Workers on this machine share its memory.
-    at_once = 1 if arguments.cluster else cluster.cores()
-    alone = dataclasses.replace(denoiser, at_once=at_once, compiled=None)
-    return cluster.each(arguments.cluster, alone, jobs, failure)
+    return cluster.each(arguments.cluster, denoiser, jobs, failure)

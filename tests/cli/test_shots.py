@@ -3,14 +3,15 @@
 import dataclasses
 import json
 import os
+import pickle
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from jflnr import exr, history, temporal
+from jflnr import cluster, exr, history, temporal
 from jflnr.cli import main
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.shots import shots_of
@@ -93,6 +94,23 @@ def test_every_folder_is_a_shot(shot: Path, tmp_path: Path) -> None:
     for name, image in zip(NAMES, means(shot), strict=True):
         np.testing.assert_allclose(light(tmp_path / "out" / f"g{name}"), image, rtol=1e-6)
         np.testing.assert_allclose(light(tmp_path / "out" / name), image, rtol=1e-6)
+
+
+@pytest.mark.usefixtures("steps")
+def test_on_a_cluster_a_shot_is_one_job(
+    shot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dask itself is tried in tests/large; here, that what travels can travel."""
+    given: list[list[Job]] = []
+
+    def each(address: str, work: Callable, jobs: list, failed: Callable) -> Iterator:
+        given.extend(jobs)
+        return (pickle.loads(pickle.dumps(work))(job) for job in jobs)
+
+    monkeypatch.setattr(cluster, "each", each)
+    assert run(shot, "-o", tmp_path / "out", "--cluster") == 0
+    assert [[job.source.name for job in jobs] for jobs in given] == [NAMES]
+    check(tmp_path / "out", means(shot))
 
 
 @pytest.mark.parametrize("missing", [[3], [1], [0, 2]])
