@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from jflnr.denoising import BACKENDS, METHODS, denoise
     from jflnr.flr.parameters import Parameters, load_parameters, save_parameters
     from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
+    from jflnr.selection.method import select
     from jflnr.uncertainty import denoise_with_error
 
 __version__ = "0.1.0"
@@ -23,10 +24,17 @@ __all__ = [
     "read_frame",
     "read_header",
     "save_parameters",
+    "select",
     "write_frame",
 ]
 
-_HOMES = ("jflnr.denoising", "jflnr.flr.parameters", "jflnr.frame", "jflnr.uncertainty")
+_HOMES = (
+    "jflnr.denoising",
+    "jflnr.flr.parameters",
+    "jflnr.frame",
+    "jflnr.selection.method",
+    "jflnr.uncertainty",
+)
 
 
 def __getattr__(name: str) -> Any:

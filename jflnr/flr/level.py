@@ -66,6 +66,21 @@ def predict(coefficients: jax.Array, regressors: jax.Array) -> jax.Array:
     return jnp.einsum("qchw,qhw,c->hw", coefficients, regressors, weights)
 
 
+class Windowed(NamedTuple):
+    """A grid under its windows, ready to be solved.
+
+    moments: `(K, h, w)`, of Q guides and, with slopes, of the position. shift: of these guides.
+    eps, eps_prime: `(h, w)`, regularisation. variance: `(h, w)`, of the mean brightness.
+    """
+
+    moments: jax.Array
+    shift: jax.Array
+    eps: jax.Array
+    eps_prime: jax.Array
+    variance: jax.Array
+    window: Window
+
+
 def fit_level(
     grid: Grid,
     features: jax.Array,
@@ -76,7 +91,24 @@ def fit_level(
     *,
     slopes: bool = True,
 ) -> Fit:
-    """Fit the models of one level.
+    """Fit the models of one level; arguments as of `windowed`."""
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    regular = system.eps, system.eps_prime
+    coefficients = solve_strips(system.moments, system.shift, *regular, channels)
+    return Fit(coefficients[: shift.size + 1], system.variance, system.window)
+
+
+def windowed(
+    grid: Grid,
+    features: jax.Array,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveParameters,
+    *,
+    slopes: bool = True,
+) -> Windowed:
+    """The normal equations of one level.
 
     The variance of a weighted mean, sum(w^2 r^2) / sum(w)^2 with residuals r, tells how noisy the
     window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
@@ -103,6 +135,5 @@ def fit_level(
     for i in range(guides + 1, guides + 1 + positions):
         moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
     centred = jnp.concatenate([shift, jnp.zeros(positions, shift.dtype)])
-    regular = numbers.eps + ridge, numbers.eps_prime + ridge
-    coefficients = solve_strips(moments, centred, *regular, channels)
-    return Fit(coefficients[: guides + 1], variance, window)
+    eps, eps_prime = numbers.eps + ridge, numbers.eps_prime + ridge
+    return Windowed(moments, centred, eps, eps_prime, variance, window)

@@ -1,0 +1,240 @@
+"""Which criterion tells best, without a reference, how wrong a local model is?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.ndimage import correlate1d
+from scipy.stats import spearmanr
+
+import jflnr
+from experiments import criteria, data, plots, results, resume
+from jflnr.flr.blur import gaussian_taps
+from jflnr.flr.level import brightness
+from jflnr.flr.moments import centre, collect, index_xy
+from jflnr.inputs import flr_images
+from jflnr.selection.blocks import BLOCK
+from jflnr.selection.method import denoise_on_blocks
+
+NAME = "criterion"
+QUESTION = "Which criterion tells best, without a reference, how wrong a local model is?"
+
+NAMES = ("normal", "depth", "ao")
+SIGMAS = (8, 16, 32)
+# Regressors of the nested orders: constant, normal, depth, ambient occlusion.
+ORDERS = (1, 4, 5, 6)
+RIDGE = 1e-4
+# Samples per pixel of the independent stream that half buffers are tested on.
+SECOND = 4
+CRITERIA = ("GCV", "Mallows", "leave block out", "half buffers")
+# Sides in pixels of the squares over which errors are averaged before they are ranked.
+SIDES = (8, 16, 32, 64)
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Rank correlation and regret of every criterion, frame by frame."""
+    paths = data.frames("val", "test")[: 1 if quick else None]
+    names = [str(path) for path in paths]
+    tag = "-quick" * quick
+    return {"rows": resume.rows(f"{NAME}{tag}", names, lambda name: one(Path(name)))}
+
+
+def one(path: Path) -> dict[str, Any]:
+    """All criteria on one frame: their rank correlation with the true error, and their regret."""
+    first, truth = sums_and_truth(path, 1)
+    # Our frames have no second stream of 1 sample, so half buffers are shown at their best.
+    second = sums_and_truth(path, SECOND)[0] if _has(path, SECOND) else None
+    used = first.xx[..., 0, 0] > 0.99
+    told: dict[str, list[np.ndarray]] = {name: [] for name in CRITERIA}
+    true = []
+    for sigma in SIGMAS:
+        for order in ORDERS:
+            found = judge(first, second, sigma / BLOCK, order)
+            for name, error in found.items():
+                told[name].append(error)
+            window = blurred(first, sigma / BLOCK).order(order)
+            model = criteria.solve(window, RIDGE)
+            true.append(criteria.mean_residual(truth.order(order), model))
+    row: dict[str, Any] = {"frame": data.label(path)}
+    errors = np.stack(true)[:, used]
+    best = errors.mean(axis=1).min()
+    row["oracle"] = float(errors.min(axis=0).mean() / best)
+    for name, candidates in told.items():
+        if not candidates:
+            continue
+        guess = np.stack(candidates)[:, used]
+        picked = np.take_along_axis(errors, guess.argmin(axis=0)[None], axis=0)
+        row[name] = {"error": float(picked.mean() / best)}
+        pairs = list(zip(true, candidates, strict=True))
+        row[name] |= {
+            str(side): float(np.mean([rank(a, b, used, side) for a, b in pairs])) for side in SIDES
+        }
+    row["ours"] = expected_error(path)
+    return row
+
+
+def sums_and_truth(path: Path, spp: int) -> tuple[criteria.Sums, criteria.Sums]:
+    """Sums over blocks of one noisy layer, and of the reference in its place."""
+    frame = jflnr.read_frame(path, spp=spp)
+    images = flr_images(frame, NAMES)
+    shift = centre(images["guides"], images["weight"])
+    found = []
+    for light in (images["target"], frame.reference):
+        planes = _collected(light, images["guides"], shift, images["weight"])
+        found.append(_brightness_sums(np.asarray(planes, np.float64)))
+    return found[0], found[1]
+
+
+@jax.jit
+def _collected(target: Any, guides: Any, shift: Any, weight: Any) -> jax.Array:
+    return collect(target, guides, shift, BLOCK, weight, brightness(3, target.dtype))
+
+
+def _brightness_sums(planes: np.ndarray) -> criteria.Sums:
+    xx = index_xy(0, 0, 5, 3)
+    cross = planes[xx:-1].reshape(6, 3, *planes.shape[1:])
+    light = np.einsum("qchw,c->qhw", cross, np.asarray(brightness(3, jnp.dtype(np.float32))))
+    return criteria.sums_of(np.concatenate([planes[:xx], light]), planes[-1], 5)
+
+
+def _has(path: Path, spp: int) -> bool:
+    try:
+        jflnr.read_frame(path, spp=spp)
+    except ValueError:
+        return False
+    return True
+
+
+def judge(
+    first: criteria.Sums, second: criteria.Sums | None, sigma: float, order: int
+) -> dict[str, np.ndarray]:
+    """What each criterion says of one candidate, `(h, w)`. sigma: in blocks."""
+    window = blurred(first, sigma)
+    weight = window.xx[..., 0, 0]
+    # Pixels that would be as good without weights: (sum w)^2 / sum w^2.
+    count = BLOCK**2 * weight**2 / np.maximum(squared(first, sigma), 1e-12)
+
+    def of(order: int) -> tuple[np.ndarray, np.ndarray]:
+        sums = window.order(order)
+        model = criteria.solve(sums, RIDGE)
+        return criteria.mean_residual(sums, model), criteria.freedom(sums, RIDGE)
+
+    mean_square, freedom = of(order)
+    noise = criteria.gcv(*of(ORDERS[-1]), count)
+    own = first.order(order)
+    at_centre = criteria.Sums(*(_centre_tap(sigma) * part for part in own))
+    left_out = criteria.leave_out(window.order(order), at_centre, RIDGE)
+    found = {
+        "GCV": criteria.gcv(mean_square, freedom, count),
+        "Mallows": criteria.mallows(mean_square, noise, freedom, count),
+        "leave block out": smooth(left_out),
+    }
+    if second is not None:
+        model = criteria.solve(window.order(order), RIDGE)
+        found["half buffers"] = smooth(criteria.mean_residual(second.order(order), model))
+    return found
+
+
+def blurred(sums: criteria.Sums, sigma: float) -> criteria.Sums:
+    """Sums under a Gaussian window of so many blocks."""
+    return criteria.Sums(*(_blur(part, _taps(sigma)) for part in sums))
+
+
+def squared(sums: criteria.Sums, sigma: float) -> np.ndarray:
+    """Sum of the squared weights under the window."""
+    return _blur(sums.xx[..., 0, 0], _taps(sigma) ** 2)
+
+
+def smooth(error: np.ndarray) -> np.ndarray:
+    """A block's own error is one draw; those around it tell of it too."""
+    return _blur(error, _taps(2.0))
+
+
+def _taps(sigma: float) -> np.ndarray:
+    reach, dtype = int(np.ceil(3 * sigma)), jnp.dtype(np.float32)
+    return np.asarray(gaussian_taps(jnp.asarray(sigma), reach, dtype), np.float64)
+
+
+def _centre_tap(sigma: float) -> float:
+    taps = _taps(sigma)
+    return float(taps[taps.size // 2] ** 2)
+
+
+def _blur(part: np.ndarray, taps: np.ndarray) -> np.ndarray:
+    for axis in (0, 1):
+        part = correlate1d(part, taps, axis=axis, mode="constant")
+    return part
+
+
+def rank(true: np.ndarray, told: np.ndarray, used: np.ndarray, side: int) -> float:
+    """Spearman's correlation over squares of `side` pixels that are wholly in use."""
+    true, told, whole = (_pool(image, side // BLOCK) for image in (true, told, used * 1.0))
+    return float(spearmanr(true[whole > 0.99], told[whole > 0.99]).statistic)
+
+
+def _pool(image: np.ndarray, by: int) -> np.ndarray:
+    h, w = (size // by for size in image.shape)
+    return image[: h * by, : w * by].reshape(h, by, w, by).mean((1, 3))
+
+
+def expected_error(path: Path) -> dict[str, float]:
+    """The same correlation for the error that the form of blocks of 8 tells of its own result."""
+    frame = jflnr.read_frame(path)
+    image, models = denoise_on_blocks(frame)
+    weights = np.array([0.2126, 0.7152, 0.0722])
+    off = ((np.asarray(image) - np.asarray(frame.reference)) @ weights) ** 2
+    error = np.asarray(models.error, np.float64)
+    inside = np.ones_like(off) if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
+    height, width = (size // BLOCK * BLOCK for size in off.shape)
+    true, used = (_pool(a[:height, :width] * 1.0, BLOCK) for a in (off, inside))
+    error = error[: true.shape[0], : true.shape[1]]
+    return {str(side): rank(true, error, used > 0.99, side) for side in SIDES}
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """criterion.md: every frame; criterion.png: rank correlation and regret, means over test."""
+    rows, names = result["rows"], [*CRITERIA, "ours"]
+    table = [
+        {"frame": row["frame"], "oracle": row["oracle"]}
+        | {
+            f"{name} {side}": row[name][str(side)]
+            for name in names
+            if name in row
+            for side in SIDES
+        }
+        | {f"{name} error": row[name]["error"] for name in CRITERIA if name in row}
+        for row in rows
+    ]
+    mean = {"frame": "mean of test"} | means(table)
+    errors = {"frame": "frame", "oracle": "oracle"}
+    errors |= {f"{name} error": name for name in CRITERIA}
+    ranks = {"frame": "frame"} | {f"{n} {side}": f"{n}, {side}" for n in names for side in (8, 32)}
+    text = results.table([*table, mean], errors) + "\n" + results.table([*table, mean], ranks)
+    plots.write_text(folder / f"{NAME}.md", text)
+    with plots.figure(folder / f"{NAME}.png", columns=2) as (left, right):
+        for name, style in zip(names, ("o-", "s--", "^:", "v-.", "D-"), strict=True):
+            left.plot(
+                SIDES, [mean.get(f"{name} {side}", np.nan) for side in SIDES], style, label=name
+            )
+        left.axhline(0.8, color="grey", linewidth=1)
+        left.set(
+            xlabel="side of the squares, pixels", ylabel="rank correlation with the true error"
+        )
+        left.set_xscale("log", base=2)
+        left.legend(fontsize=8)
+        values = [mean["oracle"], *(mean.get(f"{name} error", np.nan) for name in CRITERIA)]
+        right.bar(["oracle", *CRITERIA], values)
+        right.axhline(1, color="grey", linewidth=1)
+        right.set(ylabel="squared error, best fixed candidate = 1")
+        right.tick_params(axis="x", rotation=20)
+
+
+def means(table: list[dict[str, Any]]) -> dict[str, float]:
+    """Means over the test frames, or over all if there are none."""
+    test = [row for row in table if row["frame"].startswith("test")] or table
+    keys = {key for row in test for key in row if key != "frame"}
+    return {key: float(np.mean([row[key] for row in test if key in row])) for key in keys}
