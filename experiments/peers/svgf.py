@@ -1,13 +1,16 @@
-"""The spatial part of Spatiotemporal Variance-Guided Filtering (Schied et al. 2017), one frame.
+"""Spatiotemporal Variance-Guided Filtering (Schied et al. 2017), of one frame or of a sequence.
 
-Without a history the variance of luminance is estimated from a 7 x 7 window (section 4.2), as the
-paper does for pixels seen in fewer than four frames; five a-trous levels follow (section 4.3).
+Over a sequence light and the moments of its luminance are averaged (section 4.1); their variance
+guides five a-trous levels (section 4.3), the first of which is what the next frame starts from.
+Where a pixel has been seen in fewer than four frames, and in a single frame everywhere, the
+variance is estimated from a 7 x 7 window (section 4.2). The paper's last step, TAA, is left out: it
+works on the picture, not on the light.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +19,8 @@ import numpy as np
 from experiments.peers.atrous import SPLINE
 from experiments.peers.windows import luminance, over_offsets, square
 from jflnr.frame import Array, Frame
+from jflnr.temporal import Average, Surface, accumulate, find_taps, reproject
+from jflnr.temporal.accumulate import nothing
 
 PAPER: dict[str, Any] = {"levels": 5, "sigma_l": 4.0, "sigma_n": 128.0, "sigma_z": 1.0}
 TUNED: dict[str, Any] = {"levels": 5, "sigma_l": 1e3, "sigma_n": 4.0, "sigma_z": 4.0}
@@ -23,23 +28,100 @@ TUNED: dict[str, Any] = {"levels": 5, "sigma_l": 1e3, "sigma_n": 4.0, "sigma_z":
 GAUSS = np.outer(*[np.array([1, 2, 1], np.float32) / 4] * 2).ravel()
 
 
-def denoise(frame: Frame, *, levels: int, sigma_l: float, sigma_n: float, sigma_z: float) -> Array:
-    """Spatial SVGF of the demodulated light, `(H, W, 3)`; the widths are those of Eq. 3 to 5."""
-    return _denoise(frame, levels, sigma_l, sigma_n, sigma_z)
+# Least share of a new frame in light and moments, and frames from which moments tell the variance.
+SHARE, ENOUGH = 0.2, 4
+
+
+class State(NamedTuple):
+    """What one frame leaves to the next.
+
+    light: after the first level of filtering. moments: of luminance, `(H, W, 2)`.
+    """
+
+    surface: Surface
+    light: Average
+    moments: Average
+
+
+def start(frame: Frame) -> State:
+    """Before the first frame."""
+    height, width = frame.depth.shape[:2]
+    surface = jax.tree.map(jnp.zeros_like, Surface.of(frame))
+    return State(surface, nothing(height, width, 3), nothing(height, width, 2))
+
+
+def step(
+    state: State,
+    frame: Frame,
+    *,
+    levels: int = 5,
+    sigma_l: float = 4.0,
+    sigma_n: float = 128.0,
+    sigma_z: float = 1.0,
+) -> tuple[State, Array]:
+    """The next frame of a sequence, which has `motion`; parameters as of `denoise`.
+
+    Returns the state for the next frame, and the demodulated light, `(H, W, 3)`.
+    Raises `ValueError` for a frame without motion.
+    """
+    if frame.motion is None:
+        raise ValueError("SVGF over time needs frames with a layer motion")
+    return _step(state, frame, frame.motion, levels, (sigma_l, sigma_n, sigma_z))
 
 
 @functools.partial(jax.jit, static_argnames="levels")
-def _denoise(
-    frame: Frame, levels: int, sigma_l: float, sigma_n: float, sigma_z: float
-) -> jax.Array:
-    light, normal, depth = (jnp.asarray(a) for a in (frame.indirect, frame.normal, frame.depth))
-    slope = _slope(depth)
-    variance = _variance(light, normal, depth, slope, sigma_n, sigma_z)
+def _step(
+    state: State, frame: Frame, motion: Array, levels: int, sigmas: tuple[float, float, float]
+) -> tuple[State, jax.Array]:
+    taps = find_taps(motion, Surface.of(frame), state.surface)
+    bright = luminance(jnp.asarray(frame.indirect))
+    light = accumulate(reproject(state.light, taps), frame.indirect, SHARE)
+    moments = accumulate(
+        reproject(state.moments, taps), jnp.concatenate([bright, bright**2], axis=-1), SHARE
+    )
+    first, second = moments.mean[..., :1], moments.mean[..., 1:]
+    guides = _guides(frame)
+    variance = jnp.where(
+        moments.samples < ENOUGH - 0.5,
+        _variance(light.mean, *guides, *sigmas[1:]),
+        jnp.maximum(second - first**2, 0),
+    )
+    passes = _passes(light.mean, variance, guides, levels, sigmas)
+    kept = light._replace(mean=passes[0])
+    return State(Surface.of(frame), kept, moments), passes[-1]
+
+
+def denoise(frame: Frame, *, levels: int, sigma_l: float, sigma_n: float, sigma_z: float) -> Array:
+    """Spatial SVGF of the demodulated light, `(H, W, 3)`; the widths are those of Eq. 3 to 5."""
+    return _denoise(frame, levels, (sigma_l, sigma_n, sigma_z))
+
+
+@functools.partial(jax.jit, static_argnames="levels")
+def _denoise(frame: Frame, levels: int, sigmas: tuple[float, float, float]) -> jax.Array:
+    light, guides = jnp.asarray(frame.indirect), _guides(frame)
+    variance = _variance(light, *guides, *sigmas[1:])
+    return _passes(light, variance, guides, levels, sigmas)[-1]
+
+
+def _guides(frame: Frame) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Normal, depth and the slope of the depth."""
+    depth = jnp.asarray(frame.depth)
+    return jnp.asarray(frame.normal), depth, _slope(depth)
+
+
+def _passes(
+    light: jax.Array,
+    variance: jax.Array,
+    guides: tuple[jax.Array, jax.Array, jax.Array],
+    levels: int,
+    sigmas: tuple[float, float, float],
+) -> list[jax.Array]:
+    """The light after each a-trous level."""
+    found = []
     for level in range(levels):
-        light, variance = _pass(
-            light, variance, normal, depth, slope, (sigma_l, sigma_n, sigma_z), 2**level
-        )
-    return light
+        light, variance = _pass(light, variance, *guides, sigmas, 2**level)
+        found.append(light)
+    return found
 
 
 def _slope(depth: jax.Array) -> jax.Array:

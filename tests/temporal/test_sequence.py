@@ -100,22 +100,23 @@ def test_nothing_is_compiled_twice() -> None:
     assert sequence._step._cache_size() == programs
 
 
-def test_scan_is_the_loop_and_has_finite_gradients() -> None:
+def test_scan_is_the_loop_and_can_be_differentiated() -> None:
+    """The image scales with the light, so by Euler its derivative along the light is itself."""
     frames = [view(2 * i, 2 * (i > 0)) for i in range(3)]
     together = jax.tree.map(lambda *layers: jnp.stack(layers), *frames)
 
+    @jax.jit
     def scanned(light: jax.Array) -> tuple[jax.Array, jax.Array]:
-        inputs = dataclasses.replace(together, indirect=light)
-        body = lambda state, frame: temporal.step(state, frame, "flr")
-        images = jax.lax.scan(body, temporal.start(frames[0]), inputs)[1]
-        return jnp.sum(images[-1]), images
+        def images(light: jax.Array) -> jax.Array:
+            inputs = dataclasses.replace(together, indirect=light)
+            return jax.lax.scan(step, temporal.start(frames[0]), inputs)[1]
 
-    program = jax.jit(jax.value_and_grad(scanned, has_aux=True))
-    (_, images), gradient = program(together.indirect)
+        return jax.jvp(images, (light,), (light,))
+
+    step = functools.partial(temporal.step, method="flr")
+    images, derivative = scanned(together.indirect)
     np.testing.assert_allclose(images, run(frames, "flr"), rtol=1e-4, atol=1e-5)
-    assert np.isfinite(gradient).all()
-    # What the first frame held is in the last image.
-    assert np.count_nonzero(gradient[0]) > 0.9 * gradient[0].size
+    np.testing.assert_allclose(derivative, images, rtol=1e-2, atol=1e-3)
 
 
 def test_holes_are_filled_and_stay_finite() -> None:
