@@ -33,6 +33,7 @@ NAMES = (
     "large",
     "sequences",
     "sequence_speed",
+    "bmfr",
 )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from jflnr.opencl.context import Context
 from jflnr.opencl.moments import guide_arguments, guide_defines
-from jflnr.temporal.bmfr_fit import grid_offset
+from jflnr.temporal.bmfr_fit import FLAT, grid_offset
 
 CHANNELS = 3
 # Of the matrix [T, z]: 1, six features, three squares and the light.
@@ -52,8 +52,8 @@ def fit(
         defines | extra,
         (workers * w, h),
         (
-            width, height, number, x, y, noise, light, count, surface, *guides, *scratch, reached,
-            alpha,
+            width, height, number, x, y, noise, FLAT, light, count, surface, *guides, *scratch,
+            reached, alpha,
         ),
         group=workers,
     )  # fmt: skip

@@ -13,6 +13,9 @@ from jflnr.frame import Array
 # Displacements of the grid, in blocks: a sequence of 16 (section 6.1), here spread evenly.
 OFFSETS = np.arange(16)[:, None] * np.array([0.7548776662466927, 0.5698402909980532]) % 1
 
+# Squares that vary by less are those of two values, -1 and 1: what is left of them is rounding.
+FLAT = 1e-3
+
 
 def grid_offset(number: Any, block: int) -> jax.Array:
     """How far the first block of frame `number` lies above and left of the frame, `(2,)` pixels."""
@@ -86,14 +89,16 @@ def scaled_features(features: jax.Array, surface: jax.Array, squares: int) -> ja
     no surface. What is constant over a block is 0.
     """
 
-    def to_unit(t: jax.Array) -> jax.Array:
+    def to_unit(t: jax.Array, least: float) -> jax.Array:
         low = jnp.min(jnp.where(surface, t, jnp.inf), axis=1, keepdims=True)
         high = jnp.max(jnp.where(surface, t, -jnp.inf), axis=1, keepdims=True)
-        spread = jnp.where(high > low, high - low, 1)
-        return jnp.where(surface & (high > low), 2 * ((t - low) / spread) - 1, 0)
+        varies = high - low > least
+        return jnp.where(
+            surface & varies, 2 * ((t - low) / jnp.where(varies, high - low, 1)) - 1, 0
+        )
 
-    t = to_unit(features)
-    squared = to_unit(t[..., t.shape[-1] - squares :] ** 2)
+    t = to_unit(features, 0)
+    squared = to_unit(t[..., t.shape[-1] - squares :] ** 2, FLAT)
     return jnp.concatenate([surface.astype(t.dtype), t, squared], axis=-1)
 
 

@@ -125,9 +125,11 @@ typedef struct {
     float low[RANGES], spread[RANGES];
 } Ranges;
 
-// From -lowest and highest values of `count` features, those of each work-item, to the block's.
+// From -lowest and highest values of `count` features, those of each work-item, to the block's. What
+// varies by no more than `least` is constant.
 INLINE void find_ranges(
-    const real *reach, int first, int count, int worker, local float *partial, Ranges *ranges)
+    const real *reach, int first, int count, float least, int worker, local float *partial,
+    Ranges *ranges)
 {
     float ends[2 * Q];
 #pragma unroll
@@ -137,7 +139,7 @@ INLINE void find_ranges(
     for (int i = 0; i < count; ++i) {
         const float low = -ends[2 * i], high = ends[2 * i + 1];
         ranges->low[first + i] = low;
-        ranges->spread[first + i] = high > low ? high - low : 0;
+        ranges->spread[first + i] = high - low > least ? high - low : 0;
     }
 }
 
@@ -165,11 +167,11 @@ INLINE void load(
 #pragma unroll
         for (int c = 0; c < C; ++c) A(M + c, p) = here.used ? here.z[c] : (real)0;
     }
-    find_ranges(reach, 0, Q, worker, partial, ranges);
+    find_ranges(reach, 0, Q, 0, worker, partial, ranges);
 }
 
 INLINE void range_of_squares(
-    int worker, local float *partial, SCRATCH const float *a, Ranges *ranges)
+    float flat, int worker, local float *partial, SCRATCH const float *a, Ranges *ranges)
 {
     real reach[2 * SQUARES];
 #pragma unroll
@@ -184,7 +186,7 @@ INLINE void range_of_squares(
             reach[2 * i + 1] = there ? MAX(reach[2 * i + 1], t * t) : reach[2 * i + 1];
         }
     }
-    find_ranges(reach, Q, SQUARES, worker, partial, ranges);
+    find_ranges(reach, Q, SQUARES, flat, worker, partial, ranges);
 }
 
 // [T + N, z], and a_0 . a_j of this work-item's pixels. counter: of the block's first number.
@@ -275,9 +277,10 @@ INLINE void substitute(int worker, local const float *r, global float *alpha)
 
 // Global size (WORKERS w, h), local size (WORKERS, 1). number: of the frame. light: (H, W, C), of
 // `count` (H, W) samples. surface: (H, W), above 0 where there is one. scratch: (h, w, COLUMNS, PIXELS).
-// reached: (h, w, RANGES, 2), see blocks.h. alpha: (h, w, M, C).
+// flat: squares that vary by no more are constant. reached: (h, w, RANGES, 2), see blocks.h. alpha:
+// (h, w, M, C).
 kernel __attribute__((reqd_work_group_size(WORKERS, 1, 1))) void fit(
-    int width, int height, uint number, int offset_x, int offset_y, float noise,
+    int width, int height, uint number, int offset_x, int offset_y, float noise, float flat,
     global const float *light, global const float *count, global const float *surface,
     GUIDE_PARAMETERS,
 #ifdef SCRATCH_GLOBAL
@@ -297,7 +300,7 @@ kernel __attribute__((reqd_work_group_size(WORKERS, 1, 1))) void fit(
     load(
         light, count, surface, GUIDE_IMAGES, bx * BLOCK - offset_x, by * BLOCK - offset_y, width,
         height, worker, partial, a, &ranges);
-    range_of_squares(worker, partial, a, &ranges);
+    range_of_squares(flat, worker, partial, a, &ranges);
 
     real products[COLUMNS];
     const uint across = (width + BLOCK - 1) / BLOCK + 1;

@@ -1,0 +1,143 @@
+"""BMFR's own tables: time by kernel, OpenCL against JAX, and what its noise is for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+import jflnr
+from experiments import plots, results, shots
+from experiments.methods import backends
+from experiments.speed import enlarge, interleaved
+from jflnr.metrics import display, exposure
+from jflnr.temporal import bmfr
+from jflnr.temporal.bmfr import BmfrParameters
+
+NAME = "bmfr"
+QUESTION = "Where does BMFR's time go, do both back ends agree, and what is its noise for?"
+
+WIDTH, HEIGHT = 1280, 720
+BLOCKS = (16, 32, 64)
+# The paper's Table 4: milliseconds on an AMD Radeon Vega Frontier Edition, with blocks of 32.
+TABLE_4 = {
+    "accumulate_light": 0.44,
+    "fit": 1.55,
+    "weighted_sum": 0.12,
+    "accumulate_fitted": 0.23,
+    "taa": 0.16,
+    "all kernels": 2.54,
+}
+LAYERS = ("light", "fitted", "picture")
+LENGTH = 16  # frames
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Milliseconds by kernel and block at 1280 x 720, and the largest differences by sequence."""
+    names = shots.names()[: 1 if quick else None]
+    rows = [agreement(shots.load(name), block) for name in names for block in BLOCKS]
+    size = (90, 160) if quick else (HEIGHT, WIDTH)
+    pictured = next((name for name in names if name.endswith("camera")), names[-1])
+    return {"kernels": kernels(size, 1 if quick else 15), "agreement": rows, "shot": pictured}
+
+
+def kernels(size: tuple[int, int], repeats: int) -> list[dict[str, Any]]:
+    """Each kernel's best time, also as a multiple of the memory floor, by block size."""
+    if "opencl" not in backends():
+        return []
+    from jflnr.opencl import bmfr as on_device
+    from jflnr.opencl.context import default_context
+    from jflnr.opencl.profile import profile
+
+    before, now = (enlarge(frame, *size) for frame in shots.made_up(2).frames)
+    source = np.ones((*size, 8), np.float32)
+    target = np.zeros_like(source)
+    rows: dict[str, dict[str, Any]] = {}
+    for block in BLOCKS:
+        parameters = BmfrParameters(block=block)
+        history, _ = on_device.step(on_device.start(before), before, parameters)
+        work = lambda h=history, p=parameters: on_device.step(h, now, p)
+        floor = interleaved({"floor": lambda: np.copyto(target, source)}, repeats)["floor"]
+        for row in profile(default_context(), work, repeats):
+            if row.kernel == "copy":
+                continue
+            found = rows.setdefault(row.kernel, {"kernel": row.kernel, "mb": row.bytes / 1e6})
+            found |= {f"{block} ms": row.ms, f"{block} floors": row.ms / 1e3 / floor}
+            found["paper"] = TABLE_4[row.kernel]
+    return list(rows.values())
+
+
+def agreement(shot: shots.Shot, block: int) -> dict[str, Any]:
+    """Largest difference between JAX and OpenCL over a sequence, of each layer's largest value."""
+    from jflnr.opencl import bmfr as on_device
+
+    parameters = BmfrParameters(block=block)
+    frames = shot.frames[:LENGTH]
+    ours, right = on_device.start(frames[0]), bmfr.start(frames[0])
+    row: dict[str, Any] = dict.fromkeys(("image", *LAYERS), 0.0)
+    for frame in frames:
+        ours, found = on_device.step(ours, frame, parameters)
+        right, image = bmfr.step(right, frame, parameters)
+        pairs = {"image": (found, image)}
+        pairs |= {name: (getattr(ours, name).get(), getattr(right, name)) for name in LAYERS}
+        for name, (one, other) in pairs.items():
+            row[name] = max(row[name], difference(one, np.asarray(other)))
+    return {"sequence": shot.name, "block": block, "frames": len(frames), **row}
+
+
+def difference(found: np.ndarray, right: np.ndarray) -> float:
+    """The largest, relative to the largest value."""
+    return float(np.abs(found - right).max() / np.abs(right).max())
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """bmfr_kernels.md, bmfr_agreement.md and bmfr.png."""
+    times = {
+        f"{block} {unit}": f"{block} x {block}, {label}"
+        for block in BLOCKS
+        for unit, label in (("ms", "ms"), ("floors", "floors"))
+    }
+    columns = {"kernel": "kernel", "mb": "MB", **times, "paper": "paper, ms"}
+    plots.write_text(folder / f"{NAME}_kernels.md", results.table(result["kernels"], columns))
+    columns = {name: name for name in ("sequence", "block", "frames", "image", *LAYERS)}
+    plots.write_text(folder / f"{NAME}_agreement.md", results.table(result["agreement"], columns))
+    shot = shots.load(result["shot"])
+    pictures = stages(shot.frames[:LENGTH])
+    with plots.figure(folder / f"{NAME}.png", columns=3, rows=2, size=(4, 2.5)) as axes:
+        for axis, (title, picture) in zip(axes, pictures.items(), strict=True):
+            axis.imshow(picture, interpolation="nearest")
+            axis.set(xticks=[], yticks=[], title=f"{shot.name}: {title}")
+            axis.grid(False)
+
+
+def stages(frames: Sequence[jflnr.Frame]) -> dict[str, np.ndarray]:
+    """Pictures of the indirect light, NaN in magenta."""
+    first, last = frames[0], frames[-1]
+    lights: dict[str, tuple[jflnr.Frame, Any]] = {"1 sample per pixel": (last, last.indirect)}
+    raw = bmfr.PAPER._replace(noise=0.0)
+    lights["first frame, no noise on the features"] = first, after([first], raw)
+    lights["first frame"] = first, after([first], bmfr.PAPER)
+    lights[f"after {len(frames)} frames, without TAA"] = (
+        last,
+        after(frames, bmfr.PAPER._replace(picture_share=1.0)),
+    )
+    lights[f"after {len(frames)} frames"] = last, after(frames, bmfr.PAPER)
+    lights["reference"] = last, last.reference
+    return {name: shown(frame, np.asarray(light)) for name, (frame, light) in lights.items()}
+
+
+def after(frames: Sequence[jflnr.Frame], parameters: BmfrParameters) -> jax.Array:
+    """The image of the last frame."""
+    history = bmfr.start(frames[0])
+    for frame in frames:
+        history, image = bmfr.step(history, frame, parameters)
+    return image
+
+
+def shown(frame: jflnr.Frame, light: np.ndarray) -> np.ndarray:
+    """As in the metrics, for the eye."""
+    picture = display(frame.albedo * light, exposure(frame.albedo * frame.reference))
+    return np.where(np.isfinite(light), picture, np.float32([1, 0, 1]))
