@@ -30,7 +30,7 @@ kernel void solve(
     for (int k = 0; k < K; ++k) means[k] = filled ? means[k] * per_pixel : (real)0;
     UNROLL
     for (int q = 0; q < Q; ++q) shifts[q] = shift[q];
-    least_squares(means, means + XY(0, 0), shifts, eps, eps_prime, 0, coefficients);
+    least_squares(means, means + XY(0, 0), shifts, eps, eps_prime, 8 * FLT_EPSILON, coefficients);
     UNROLL
     for (int i = 0; i < (Q + 1) * C; ++i) WRITE(coefficients[i], model + i * plane);
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal
 
@@ -13,6 +14,8 @@ from jax import lax
 from jflnr.flr.moments import index_xx, index_xy
 from jflnr.flr.parameters import Parameters
 
+# Roundings that a variance, a difference of two sums, or a pivot may be off by.
+ROUNDING = 8
 Solver = Literal["cholesky", "block-inverse"]
 
 
@@ -33,9 +36,7 @@ def solve(
     moments: `(K, h, w)`, blurred. shift: `(Q,)`. channels: the number C of target channels.
     Returns `(Q + 1, C, h, w)`: the value of Y at X = shift, then the slope of each guide.
     """
-    # At these limits nothing changes any more, and beyond them the numbers below overflow.
-    eps = jnp.minimum(parameters.eps.astype(moments.dtype), 1e4)
-    eps_prime = jnp.clip(parameters.eps_prime.astype(moments.dtype), 1e-30, 1e30)
+    eps, eps_prime = (number.astype(moments.dtype) for number in regularisation(parameters))
     count = shift.size
     n = moments[0]
     filled = (n > 1e-12) & jnp.all(jnp.isfinite(moments), axis=0)
@@ -51,12 +52,15 @@ def solve(
     mean_y = means[index_xy(0, 0, count, channels) :][:channels]
     covariance = means[pairs.reshape(count, count)] - mean_x[:, None] * mean_x
 
-    # Eq. 18; rounding can leave a flat guide's variance just below zero.
+    # Eq. 18; rounding can leave a flat guide's variance just below zero, and far from the shift no
+    # more of it is known than rounding leaves.
     diagonal = jnp.eye(count, dtype=bool)[:, :, None, None]
     covariance = jnp.where(diagonal, jnp.maximum(covariance, 0), covariance)
+    unknown = ROUNDING * jnp.finfo(moments.dtype).eps * (covariance + mean_x[:, None] * mean_x)
     mu = mean_x + shift[:, None, None].astype(moments.dtype)
     outer = mu[:, None] * mu
-    regular = covariance + eps * outer + jnp.where(diagonal, eps * outer + eps_prime, 0)
+    ridge = eps * outer + eps_prime + unknown
+    regular = covariance + eps * outer + jnp.where(diagonal, ridge, 0)
 
     # Eq. 19 to 22, with a unit diagonal before eps' is added.
     scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)])) if count else mean_x
@@ -69,18 +73,27 @@ def solve(
     return jnp.concatenate([value[None], slopes])
 
 
+def regularisation(parameters: Parameters) -> tuple[jax.Array, jax.Array]:
+    """eps and eps', cut where they change nothing any more and numbers after them would overflow.
+
+    Their logarithms are, since the exponential's derivative may be infinite.
+    """
+    return (
+        jnp.exp(jnp.minimum(parameters.log_eps, math.log(1e4))),
+        jnp.exp(jnp.clip(parameters.log_eps_prime, math.log(1e-24), math.log(1e30))),
+    )
+
+
 def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
     """Solve `matrix @ a = right` by Cholesky in its root-free form, `matrix = L D L^T`.
 
     matrix: `(Q, Q, h, w)`, symmetric with a diagonal near 1. right: `(Q, C, h, w)`.
-    Returns `(Q, C, h, w)`. A pivot that is no larger than the rounding error belongs to a guide
-    that the ones before it already explain: that guide gets the slope 0.
+    Returns `(Q, C, h, w)`.
     """
     steps = []
     while matrix.shape[0]:
         pivot, row, first = matrix[0, 0], matrix[0, 1:], right[0]
-        clear = pivot > 8 * jnp.finfo(pivot.dtype).eps
-        inverse = jnp.where(clear, 1 / jnp.where(clear, pivot, 1), 0)
+        inverse = _inverse_pivot(pivot)
         steps.append((inverse, row, first))
         factor = row * inverse
         matrix = matrix[1:, 1:] - factor[:, None] * row
@@ -92,6 +105,13 @@ def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
     return solution
 
 
+def _inverse_pivot(pivot: jax.Array) -> jax.Array:
+    """A pivot that is no larger than the rounding error belongs to a guide that the ones before it
+    already explain: 0, and so is that guide's slope."""
+    clear = pivot > ROUNDING * jnp.finfo(pivot.dtype).eps
+    return jnp.where(clear, 1 / jnp.where(clear, pivot, 1), 0)
+
+
 def block_inverse_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
     """Solve by the paper's recursive block-matrix inverse (Appendix, first formula)."""
     return _product(_block_inverse(matrix), right)
@@ -100,7 +120,7 @@ def block_inverse_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
 def _block_inverse(matrix: jax.Array) -> jax.Array:
     """Inverse of symmetric matrices `(Q, Q, h, w)` by halving them."""
     if matrix.shape[0] <= 1:
-        return 1 / matrix
+        return _inverse_pivot(matrix)
     half = matrix.shape[0] // 2
     a_inverse = _block_inverse(matrix[:half, :half])
     a_inverse_b = _product(a_inverse, matrix[:half, half:])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from jflnr.flr.parameters import Parameters
+from jflnr.flr.solve import regularisation
 from jflnr.opencl.context import Context
 
 
@@ -19,7 +20,7 @@ def solve(
     h, pitch = moments.shape[1:]
     width = context.width()
     model = context.empty((guides + 1, channels, h, pitch))
-    eps, eps_prime = float(parameters.eps), float(parameters.eps_prime)
+    eps, eps_prime = map(float, regularisation(parameters))
     context.run(
         "solve",
         "solve.cl",
