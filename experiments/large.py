@@ -33,6 +33,7 @@ NAME = "large"
 QUESTION = "What do large frames, many frames and several workers take, in memory and in time?"
 
 METHODS = ("flr", "flr-adaptive")
+BACKENDS = ("jax", "opencl")
 # Pixels of the frames whose memory is measured, and what they may take in pieces.
 SIZES = ((1080, 1920), (2160, 3840), (4320, 7680))
 MEMORY = "1500M"
@@ -60,7 +61,7 @@ def run(quick: bool) -> dict[str, Any]:
         _shot(shot, 4 if quick else FRAMES, *((180, 320) if quick else (720, 1280)))
         return {
             "memory": memory,
-            "pipeline": _pipeline(shot),
+            "pipeline": [row for backend in BACKENDS for row in _pipeline(shot, backend)],
             "workers": _workers(shot),
             "killed": _killed(shot),
         }
@@ -99,38 +100,31 @@ def _denoiser(*options: str) -> Denoiser:
     return Denoiser(settings_of(arguments), arguments, None, 3)
 
 
-def _pipeline(shot: Path) -> dict[str, float]:
+def _pipeline(shot: Path, backend: str) -> list[dict[str, Any]]:
     """Frames per second: the work alone, the files alone, and both at once."""
-    denoiser = _denoiser()
+    denoiser = _denoiser("--backend", backend)
     with tempfile.TemporaryDirectory() as out:
         jobs = plan([shot], Path(out))[:20]
         loaded = [denoiser.read(job) for job in jobs]
-        ready = [denoiser.denoise(one) for one in loaded]
-        return {
-            "work alone": _rate(jobs, lambda: [denoiser.denoise(one) for one in loaded]),
-            "EXR alone": _rate(
-                jobs,
-                lambda: list(
-                    pipelined(
-                        range(len(jobs)),
-                        lambda i: (denoiser.read(jobs[i]), i)[1],
-                        lambda i: ready[i],
-                        denoiser.write,
-                    )
-                ),
-            ),
-            "one after another": _rate(jobs, lambda: [denoiser(job) for job in jobs]),
-            "pipeline": _rate(
-                jobs,
-                lambda: list(pipelined(jobs, denoiser.read, denoiser.denoise, denoiser.write)),
-            ),
+        ready = dict(zip(jobs, map(denoiser.denoise, loaded), strict=True))
+        read = lambda job: (denoiser.read(job), job)[1]
+        every = lambda *stages: list(pipelined(jobs, *stages))
+        ways: dict[str, Callable[[], Any]] = {
+            "work alone": lambda: [denoiser.denoise(one) for one in loaded],
+            "EXR alone, in a loop": lambda: [denoiser.write(ready[read(job)]) for job in jobs],
+            "EXR alone, on two threads": lambda: every(read, ready.get, denoiser.write),
+            "one after another": lambda: [denoiser(job) for job in jobs],
+            "pipeline": lambda: every(denoiser.read, denoiser.denoise, denoiser.write),
         }
+        return [{"backend": backend, "what": n, **_rate(jobs, way)} for n, way in ways.items()]
 
 
-def _rate(jobs: list[Job], work: Callable[[], Any]) -> float:
-    start = time.perf_counter()
+def _rate(jobs: list[Job], work: Callable[[], Any]) -> dict[str, float]:
+    """Frames a second, and what a frame takes of all processors together, in milliseconds."""
+    start, busy = time.perf_counter(), time.process_time()
     work()
-    return len(jobs) / (time.perf_counter() - start)
+    rate = len(jobs) / (time.perf_counter() - start)
+    return {"rate": rate, "cpu": 1000 * (time.process_time() - busy) / len(jobs)}
 
 
 def _workers(shot: Path) -> list[dict[str, Any]]:
@@ -140,12 +134,12 @@ def _workers(shot: Path) -> list[dict[str, Any]]:
         jobs, alone = plan([shot], Path(out)), dataclasses.replace(_denoiser(), compiled=None)
         one = lambda: list(pipelined(jobs, alone.read, alone.denoise, alone.write))
         one()
-        rows.append({"workers": 0, "rate": _rate(jobs, one)})
+        rows.append({"workers": 0, **_rate(jobs, one)})
         for count in WORKERS:
             with local_cluster(count) as local:
                 every = lambda to=local.scheduler_address: list(each(to, alone, jobs, failure))
                 every()
-                rows.append({"workers": count, "rate": _rate(jobs, every)})
+                rows.append({"workers": count, **_rate(jobs, every)})
     return rows
 
 
@@ -214,8 +208,13 @@ def draw(result: dict[str, Any], folder: Path) -> None:
         "seconds": "seconds",
     }
     text = results.table(result["memory"], columns)
-    rates = [{"what": name, "rate": rate} for name, rate in result["pipeline"].items()]
-    text += "\n" + results.table(rates, {"what": "a folder of frames", "rate": "frames/s"})
+    columns = {
+        "backend": "back end",
+        "what": "a folder of frames",
+        "rate": "frames/s",
+        "cpu": "processor ms a frame",
+    }
+    text += "\n" + results.table(result["pipeline"], columns)
     text += "\n" + results.table(result["workers"], {"workers": "workers", "rate": "frames/s"})
     text += "\n" + results.table([result["killed"]], {name: name for name in result["killed"]})
     plots.write_text(folder / f"{NAME}_figures.md", text)

@@ -90,6 +90,8 @@ def composite(frame: Frame, indirect: Array) -> Array:
 
 def not_finite(frame: Frame) -> dict[str, int]:
     """How many pixels of each layer hold a NaN or an infinity, for the layers that have any."""
-    layers = {name: image for name, image in vars(frame).items() if image is not None}
-    counts = {n: int((~np.isfinite(image).all(axis=-1)).sum()) for n, image in layers.items()}
-    return {name: count for name, count in counts.items() if count}
+    counts = {}
+    for name, image in vars(frame).items():
+        if image is not None and not (finite := np.isfinite(image)).all():
+            counts[name] = int((~finite.all(axis=-1)).sum())
+    return counts

@@ -116,7 +116,8 @@ def writing(
         left, top, right, bottom = window.display
         spec.full_x, spec.full_y = left, top
         spec.full_width, spec.full_height = right - left + 1, bottom - top + 1
-    spec.attribute("compression", "zip")
+    # As `exr.write_channels` does.
+    spec.attribute("compression", "rle" if kind == "float" else "zip")
     spec.attribute("comments", comments)
     row, stored = spec.y, np.float32 if kind == "float" else np.float16
     with replacing(path) as beside:

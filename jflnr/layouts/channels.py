@@ -24,6 +24,9 @@ LAYERS = {
 }
 NATIVE = {layer: tuple(f"{layer}.{c}" for c in parts) for layer, parts in LAYERS.items()}
 
+# Every half number as float32, by its bits: numpy converts three times slower than it looks up.
+HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
+
 # In the order of both `R G B` and `X Y Z`; `red` and the like count by their first letter.
 ORDER = "RXUGYVBZT"
 
@@ -78,7 +81,7 @@ def layer(
         raise ValueError(f"{source}: layer {stem} is missing; {advice or present(channels)}")
     if missing:
         raise ValueError(f"{source}: layer {stem} lacks its channel {', '.join(missing)}")
-    image = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
+    image = _float32(np.stack([channels[channel] for channel in names], axis=-1))
     if not part and not np.isfinite(image).any():
         raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
     count = len(LAYERS.get(name, "RGB"))
@@ -87,6 +90,12 @@ def layer(
     if count == 1 < len(names):
         return image.mean(axis=-1, keepdims=True)
     return np.repeat(image, count, axis=-1) if len(names) == 1 < count else image
+
+
+def _float32(image: np.ndarray) -> np.ndarray:
+    if image.dtype != np.float16:
+        return image.astype(np.float32)
+    return HALVES[image.view(np.uint16)]
 
 
 def present(channels: Iterable[str]) -> str:
