@@ -81,15 +81,15 @@ def denoise(
 
         return select_inputs(inputs, names, keep_energy=keep_energy)[1]
     if method in flnr.METHODS:
-        if backend != "jax" or block != BLOCK or tile is not None:
-            raise ValueError(
-                f"method {method} runs on the jax backend, in one piece, with block {BLOCK}"
-            )
+        if backend != "jax" or block != BLOCK:
+            raise ValueError(f"method {method} runs on the jax backend, with block {BLOCK}")
         from jflnr.flnr.method import denoise_flnr
+        from jflnr.flnr.weights import shipped
 
-        own = _parameters(parameters, None if parameters is None else {})
-        return denoise_flnr(inputs, method, own, names=names, keep_energy=keep_energy)
-    if method == "flr-adaptive":
+        settings = _parameters(parameters, {}) if parameters is not None else shipped(method)
+        if tile is None:
+            return denoise_flnr(inputs, method, settings, names=names, keep_energy=keep_energy)
+    elif method == "flr-adaptive":
         settings = _parameters(parameters, ADAPTIVE_DEFAULT)
         if backend != "jax" and tile is not None:
             raise ValueError("method flr-adaptive works in tiles on the jax backend only")

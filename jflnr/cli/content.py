@@ -43,7 +43,7 @@ def picture_of(frame: "Frame", lights: dict[str, np.ndarray]) -> np.ndarray:
 def about_of(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[str, Any]:
     """What was done, for the record and for the header of the output."""
     model = settings.get("parameters")
-    names = ("sigma", "eps", "eps_prime") if model else ()
+    names = ("sigma", "eps", "eps_prime") if settings["method"] == "flr" else ()
     return {
         "method": settings["method"],
         "backend": settings["backend"],

@@ -26,14 +26,17 @@ OF_GRID, OF_STEP = 6, 6
 COUNT = 4 * (OF_GRID + OF_STEP + CHANNELS) + 2 * OF_STEP + BLURS + 2
 
 
-def of_steps(steps: list[Step], guides: int, mean: jax.Array) -> jax.Array:
+def of_steps(
+    steps: list[Step], guides: int, mean: jax.Array, means: tuple[jax.Array, jax.Array] | None
+) -> jax.Array:
     """All that is read, on blocks twice as large as the finest: `(h, w, COUNT)`.
 
     The finest blocks lie side by side as channels. steps: coarse to fine. mean: of the frame.
+    means: `light_means` of the frame that the blocks are a part of; of the blocks if None.
     """
     last = steps[-1]
-    colour = jnp.einsum("qchw,qhw->chw", last.merged, mean_guides(last.grid.moments, guides))
-    light = log_light(jnp.einsum("chw,c->hw", colour, brightness(CHANNELS, colour.dtype)), mean)
+    colour = colour_of(last.merged, last.grid.moments, guides)
+    light = log_light(_brightness(colour), mean)
     finest = [
         of_grid(last.grid, guides, mean),
         of_step(last, mean),
@@ -42,10 +45,22 @@ def of_steps(steps: list[Step], guides: int, mean: jax.Array) -> jax.Array:
     packed = unet.pack(jnp.concatenate(finest))
     size = packed.shape[:2]
     coarser = [double(of_step(steps[0], mean), *size), of_step(steps[1], mean)]
-    whole = jnp.stack([jnp.log(_mean_light(colour) / mean + 0.1), jnp.mean(light)])
+    linear, logarithmic = light_means(colour, mean) if means is None else means
+    whole = jnp.stack([jnp.log(linear / mean + 0.1), logarithmic])
     whole = jnp.broadcast_to(whole[:, None, None], (2, *size))
     planes = jnp.concatenate([*coarser, blurred_light(last.grid, guides, mean), whole])
     return jnp.concatenate([packed, jnp.moveaxis(planes, 0, -1)], axis=-1)
+
+
+def colour_of(models: jax.Array, moments: jax.Array, guides: int) -> jax.Array:
+    """The light that models `(Q + 1, C, h, w)` give their blocks, `(C, h, w)`."""
+    return jnp.einsum("qchw,qhw->chw", models, mean_guides(moments, guides))
+
+
+def light_means(colour: jax.Array, mean: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The mean over blocks of their brightness and of its logarithm. colour: `(C, h, w)`."""
+    light = _brightness(jnp.maximum(colour, 0))
+    return jnp.mean(light), jnp.mean(log_light(_brightness(colour), mean))
 
 
 def log_light(light: jax.Array, mean: jax.Array) -> jax.Array:
@@ -101,15 +116,13 @@ def blurred_light(grid: Grid, guides: int, mean: jax.Array) -> jax.Array:
     return jnp.concatenate(found)
 
 
-def _mean_light(colour: jax.Array) -> jax.Array:
-    light = jnp.maximum(colour, 0)
-    return jnp.mean(jnp.einsum("chw,c->hw", light, brightness(CHANNELS, colour.dtype)))
+def _brightness(colour: jax.Array) -> jax.Array:
+    return jnp.einsum("chw,c->hw", colour, brightness(CHANNELS, colour.dtype))
 
 
 def _light(moments: jax.Array, guides: int) -> jax.Array:
     start = index_xy(0, 0, guides, CHANNELS)
-    weights = brightness(CHANNELS, moments.dtype)
-    return jnp.einsum("chw,c->hw", moments[start : start + CHANNELS], weights)
+    return _brightness(moments[start : start + CHANNELS])
 
 
 def _tent(planes: jax.Array) -> jax.Array:

@@ -26,22 +26,27 @@ def denoise_flnr(
 
     frame: as from `read_frame`, with `ao`. params: as from `weights.load`; those that come with the
     package if None. names: the guides asked for. keep_energy: keep the mean radiance exactly.
-    Returns `(H, W, 3)`.
-
-    Raises `ValueError` for another set of guides than the network was trained with, and for light
-    of other than three channels or of another size than the guides.
+    Returns `(H, W, 3)`. Raises as `check` does.
     """
+    check(method, names, frame.indirect.shape, frame.normal.shape)
+    return _denoise(frame, weights.shipped(method) if params is None else params, keep_energy)
+
+
+def check(
+    method: str, names: Sequence[str], light: tuple[int, ...], normal: tuple[int, ...]
+) -> None:
+    """Raise `ValueError` for another set of guides than the network was trained with, and for light
+    of other than three channels or of another size than the guides. light, normal: their shapes."""
     if sorted(names) != sorted(features.GUIDES):
         raise ValueError(
             f"method {method} was trained with the guides {', '.join(features.GUIDES)} and works "
             f"with no others; got {', '.join(names) or 'none'}. flr and flr-adaptive take any"
         )
-    if frame.indirect.shape != frame.normal.shape:
+    if light != normal:
         raise ValueError(
             f"method {method} needs frame.indirect of three channels and as large as the guides; "
-            f"got {frame.indirect.shape} and {frame.normal.shape}"
+            f"got {light} and {normal}"
         )
-    return _denoise(frame, weights.shipped(method) if params is None else params, keep_energy)
 
 
 @functools.partial(jax.jit, static_argnames="keep_energy")

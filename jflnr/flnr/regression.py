@@ -21,6 +21,7 @@ from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.apply import apply, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import restoring_factor
+from jflnr.flr.level import Fit
 from jflnr.flr.moments import Guides, centre
 from jflnr.flr.pyramid import double
 
@@ -86,15 +87,23 @@ def prepare(
     pilot = adaptive.Pilot(with_borders(models), mean)
     grid = adaptive.collect_grid(target, guides, shift, pilot, weight, numbers, BLOCK)
     coarsest, steps = widths.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
-    frame = Prepared(
-        x=features.of_steps(steps, shift.size, mean),
+    factor = restoring_factor(steps[-1].merged, moments, shift.size, numbers.slack)
+    x = features.of_steps(steps, shift.size, mean, None)
+    return prepared(x, coarsest, steps, factor, mean), shift
+
+
+def prepared(
+    x: jax.Array, coarsest: Fit, steps: list[widths.Step], factor: jax.Array, mean: jax.Array
+) -> Prepared:
+    """What the network reads and steers, from the fits of all levels."""
+    return Prepared(
+        x=x,
         coarsest=coarsest.coefficients,
         differences=tuple(s.fine.coefficients - s.coarse.coefficients for s in steps),
         shares=tuple(step.share for step in steps),
-        factor=restoring_factor(steps[-1].merged, moments, shift.size, numbers.slack),
+        factor=factor,
         mean=mean,
     )
-    return frame, shift
 
 
 def finish(params: unet.Params, frame: Prepared) -> jax.Array:

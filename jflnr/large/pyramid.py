@@ -10,7 +10,7 @@ is summed up on the way.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,6 +69,11 @@ class Job:
         return list(itertools.product(rows, columns))
 
 
+# Of a job, its moments and models, the brightness that these give blocks twice as large, the mean
+# brightness, and how much brightness is given back.
+Network = Callable[[Job, Planes, Planes, np.ndarray, jax.Array, jax.Array], None]
+
+
 def strips(
     rows: Rows,
     names: tuple[str, ...],
@@ -78,11 +83,12 @@ def strips(
     tile: int,
     keep_energy: bool = False,
     folder: Path | None = None,
+    network: Network | None = None,
 ) -> Iterator[Strip]:
     """The frame in strips from top to bottom; arguments as of `flr_adaptive`.
 
     names: of the guides. tile: side in pixels of a square as large as what is worked on at a time.
-    folder: for temporary files.
+    folder: for temporary files. network: puts other models in the place of those fitted.
     """
     scene = scene_of(rows)
     shift = shift_of(rows, lambda frame: steps.guides_of(frame, names, scene))
@@ -101,6 +107,9 @@ def strips(
         output, before, squares = _fit(job, light, moments, models, mean)
         sums = [jnp.float32(total) for total in (wanted, before, squares)]
         rate = energy.rate(sums[0], sums[1], sums[2], common.numbers.slack)
+        if network is not None:
+            network(job, moments, models, output, mean, rate)
+            rate = jnp.float32(0)
         share = 1.0
         if keep_energy:
             share = _kept_share(rows, _apply(job, models, output, rate))

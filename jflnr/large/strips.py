@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from jflnr import flnr
 from jflnr import guides as guide_layers
 from jflnr.denoising import Part, denoise_flr, support_of
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
@@ -32,8 +34,7 @@ class Options(NamedTuple):
 def options(settings: Mapping[str, Any], names: tuple[str, ...]) -> Options:
     """From keyword arguments of `jflnr.denoise`."""
     method = settings["method"]
-    default = DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
-    parameters = settings.get("parameters") or default
+    parameters = settings.get("parameters") or default_parameters(method)
     return Options(method, parameters, names, settings["block"], settings["backend"])
 
 
@@ -60,10 +61,29 @@ def denoise(rows: Rows, options: Options, tile: int, folder: Path | None = None)
 
         height = max(tile * tile // rows.width, 1)
         return local.strips(rows, one, height=height, block=block, support=support)
-    if method != "flr-adaptive" or backend != "jax":
+    if method not in ("flr-adaptive", *flnr.METHODS) or backend != "jax":
         raise ValueError(
             f"method {method} on {backend} needs the whole frame in memory: raise --memory"
         )
-    return pyramid.strips(
-        rows, names, parameters, block=block, tile=tile, keep_energy=keep_energy, folder=folder
+    pieces = functools.partial(
+        pyramid.strips, rows, block=block, tile=tile, keep_energy=keep_energy, folder=folder
     )
+    if method == "flr-adaptive":
+        return pieces(names, parameters)
+    from jflnr.flnr.features import GUIDES
+    from jflnr.flnr.method import check
+    from jflnr.large.network import correct
+
+    light = rows.height // rows.factor, rows.width // rows.factor, rows.channels
+    check(method, names, light, (rows.height, rows.width, 3))
+    network = functools.partial(correct, params=parameters)
+    return pieces(GUIDES, ADAPTIVE_DEFAULT, network=network)
+
+
+def default_parameters(method: str) -> Any:
+    """The parameters of a method when nobody says."""
+    if method in flnr.METHODS:
+        from jflnr.flnr import weights
+
+        return weights.shipped(method)
+    return DEFAULT if method == "flr" else ADAPTIVE_DEFAULT

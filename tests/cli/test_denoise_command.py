@@ -22,6 +22,7 @@ from PIL import Image
 from jflnr import denoising, exr, metrics
 from jflnr.cli import main
 from jflnr.cli.jobs import plan
+from jflnr.flnr.weights import FOLDER, shipped
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 from jflnr.metrics import exposure
 
@@ -104,6 +105,14 @@ def test_options_reach_the_denoiser(tmp_path: Path, frame_file: Path, stand_in: 
     assert float(mixed["parameters"].eps) == pytest.approx(0.5)
     assert float(mixed["parameters"].eps_prime) == pytest.approx(1e-3)
     assert (bare["block"], bare["guides"]) == (2, ())
+
+
+def test_weights_of_ones_own_reach_the_denoiser(
+    tmp_path: Path, frame_file: Path, stand_in: list[dict]
+) -> None:
+    weights = FOLDER / "flnr.npz"
+    assert run(frame_file, "-o", tmp_path / "o.exr", "--method", "flnr", "--params", weights) == 0
+    assert stand_in[0]["parameters"].keys() == shipped("flnr").keys()
 
 
 def test_direct_light_is_denoised_beside_the_indirect(

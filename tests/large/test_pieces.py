@@ -79,11 +79,12 @@ def test_options_of_flr_hold_in_strips(rng):
     assert relative(jflnr.denoise(frame, block=4, tile=30, **options), whole) < RELATIVE
 
 
-def test_adaptive_flr_in_tiles_is_adaptive_flr(rng):
+@pytest.mark.parametrize("method", ["flr-adaptive", "flnr"])
+def test_adaptive_flr_and_flnr_in_tiles_are_themselves(rng, method):
     """Wide enough for five tiles whose windows end before the next but one."""
     frame = room(rng, 70, 3584)
-    whole = np.asarray(jflnr.denoise(frame, "flr-adaptive"))
-    ours = np.asarray(jflnr.denoise(frame, "flr-adaptive", tile=600))
+    whole = np.asarray(jflnr.denoise(frame, method))
+    ours = np.asarray(jflnr.denoise(frame, method, tile=600))
     assert relative(ours, whole) < RELATIVE
     # No seam: where strips and tiles meet, nothing differs more than elsewhere.
     assert np.abs(ours - whole).max() < 1e-3 * whole.mean()
@@ -116,7 +117,7 @@ def test_what_is_no_size_is_named(text):
         memory.parse(text)
 
 
-@pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
+@pytest.mark.parametrize("method", ["flr", "flr-adaptive", "flnr"])
 def test_larger_frames_come_in_smaller_pieces(method):
     gigabyte = 1 << 30
     assert memory.tile_for(1080, 1920, 4 * gigabyte, method=method) is None
