@@ -94,16 +94,17 @@ def difference(found: np.ndarray, right: np.ndarray) -> float:
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """bmfr_kernels.md, bmfr_agreement.md and bmfr.png."""
+    """bmfr_figures.md and bmfr.png."""
     times = {
-        f"{block} {unit}": f"{block} x {block}, {label}"
+        f"{block} {unit}": f"{block} x {block}, {unit}"
         for block in BLOCKS
-        for unit, label in (("ms", "ms"), ("floors", "floors"))
+        for unit in ("ms", "floors")
     }
     columns = {"kernel": "kernel", "mb": "MB", **times, "paper": "paper, ms"}
-    plots.write_text(folder / f"{NAME}_kernels.md", results.table(result["kernels"], columns))
+    text = results.table(result["kernels"], columns)
     columns = {name: name for name in ("sequence", "block", "frames", "image", *LAYERS)}
-    plots.write_text(folder / f"{NAME}_agreement.md", results.table(result["agreement"], columns))
+    text += "\n" + results.table(result["agreement"], columns)
+    plots.write_text(folder / f"{NAME}_figures.md", text)
     shot = shots.load(result["shot"])
     pictures = stages(shot.frames[:LENGTH])
     with plots.figure(folder / f"{NAME}.png", columns=3, rows=2, size=(4, 2.5)) as axes:
