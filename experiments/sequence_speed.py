@@ -58,9 +58,7 @@ def calls(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
         from jflnr.opencl import bmfr as kernels
 
         found["BMFR, OpenCL"] = second(kernels.start, kernels.step, before, now)
-    if hasattr(svgf, "step"):
-        found["SVGF, JAX"] = second(svgf.start, svgf.step, *frames)
-    return found
+    return found | {"SVGF, JAX": second(svgf.start, svgf.step, *frames)}
 
 
 def second(

@@ -37,6 +37,7 @@ CHARTED = {
     "BMFR": ("--", plots.COLOURS[1]),
     "BMFR without TAA": ("-.", plots.COLOURS[1]),
     "SVGF": ("--", plots.COLOURS[3]),
+    "SVGF, tuned": ("-.", plots.COLOURS[3]),
     "OIDN": (":", plots.COLOURS[5]),
 }
 MARGIN = {
@@ -44,6 +45,7 @@ MARGIN = {
     "BMFR": "BMFR",
     "BMFR without TAA": "BMFR without TAA",
     "SVGF": "SVGF",
+    "SVGF, tuned": "SVGF, tuned",
 }
 
 
@@ -122,8 +124,8 @@ def margins(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             if (theirs := by.get((row["shot"], other))) is not None:
                 line[f"PSNR above {title}"] = row["psnr"] - theirs["psnr"]
                 line[f"warped error below {title}, times"] = theirs["warped"] / row["warped"]
-                if "lag" in row:
-                    line[f"lag / {title}'s"] = row["lag"] / theirs["lag"] if theirs["lag"] else None
+                if "lag" in row and other == "BMFR":
+                    line["lag / BMFR's"] = row["lag"] / theirs["lag"]
         found.append(line)
     return found
 
@@ -177,8 +179,7 @@ def recoveries(rows: list[dict[str, Any]]) -> str:
 
 def compared(margins: list[dict[str, Any]]) -> str:
     """Gains in PSNR, quotients of flicker and of lag."""
-    columns = {"shot": "sequence", "method": "method"}
-    columns |= {key: key for row in margins for key in row}
+    columns = {key: key for row in margins for key in row} | {"shot": "sequence"}
     return results.table(margins, columns)
 
 

@@ -94,9 +94,11 @@ def methods() -> list[Method]:
     peers = [
         Method("BMFR", "peer", in_steps(bmfr.start, bmfr.step)),
         Method("BMFR without TAA", "peer", in_steps(bmfr.start, without_taa)),
+        Method("SVGF", "peer", in_steps(svgf.start, svgf.step)),
+        Method(
+            "SVGF, tuned", "peer", in_steps(svgf.start, functools.partial(svgf.step, **svgf.TUNED))
+        ),
     ]
-    if hasattr(svgf, "step"):
-        peers.append(Method("SVGF", "peer", in_steps(svgf.start, svgf.step)))
     oidn = [
         Method("OIDN", "peer", functools.partial(each, denoise))
         for denoise in oidn_peers()
