@@ -94,7 +94,7 @@ def difference(found: np.ndarray, right: np.ndarray) -> float:
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """bmfr_figures.md and bmfr.png."""
+    """bmfr_figures.md and bmfr.jpg."""
     times = {
         f"{block} {unit}": f"{block} x {block}, {unit}"
         for block in BLOCKS
@@ -107,10 +107,10 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     plots.write_text(folder / f"{NAME}_figures.md", text)
     shot = shots.load(result["shot"])
     pictures = stages(shot.frames[:LENGTH])
-    with plots.figure(folder / f"{NAME}.png", columns=3, rows=2, size=(4, 2.5)) as axes:
+    with plots.figure(folder / f"{NAME}.jpg", columns=3, rows=2, size=(4, 2.5)) as axes:
         for axis, (title, picture) in zip(axes, pictures.items(), strict=True):
             axis.imshow(picture, interpolation="nearest")
-            axis.set(xticks=[], yticks=[], title=f"{shot.name}: {title}")
+            axis.set(xticks=[], yticks=[], title=title)
             axis.grid(False)
 
 
@@ -119,7 +119,7 @@ def stages(frames: Sequence[jflnr.Frame]) -> dict[str, np.ndarray]:
     first, last = frames[0], frames[-1]
     lights: dict[str, tuple[jflnr.Frame, Any]] = {"1 sample per pixel": (last, last.indirect)}
     raw = bmfr.PAPER._replace(noise=0.0)
-    lights["first frame, no noise on the features"] = first, after([first], raw)
+    lights["first frame, without noise on features"] = first, after([first], raw)
     lights["first frame"] = first, after([first], bmfr.PAPER)
     lights[f"after {len(frames)} frames, without TAA"] = (
         last,
@@ -140,5 +140,6 @@ def after(frames: Sequence[jflnr.Frame], parameters: BmfrParameters) -> jax.Arra
 
 def shown(frame: jflnr.Frame, light: np.ndarray) -> np.ndarray:
     """As in the metrics, for the eye."""
-    picture = display(frame.albedo * light, exposure(frame.albedo * frame.reference))
-    return np.where(np.isfinite(light), picture, np.float32([1, 0, 1]))
+    albedo, reference = np.asarray(frame.albedo), np.asarray(frame.reference)
+    picture = display(albedo * light, exposure(albedo * reference))
+    return np.where(np.isfinite(light), picture, np.array([1, 0, 1], np.float32))

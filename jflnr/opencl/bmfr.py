@@ -18,8 +18,8 @@ from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 def start(frame: Frame, context: Context | None = None) -> History:
     """`jflnr.temporal.bmfr.start`, on the device."""
     context = default_context() if context is None else context
-    zeros = lambda channels: context.array(np.zeros((*size, channels), np.float32))
     size = frame.normal.shape[:2]
+    zeros = lambda channels: context.array(np.zeros((*size, channels), np.float32))
     surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))
     return History(0, surface, zeros(1), zeros(3), zeros(3), zeros(3))
 
@@ -42,7 +42,8 @@ def step(
     """
     context = default_context() if context is None else context
     bmfr.check(frame)
-    output, result = to_output(context, frame.indirect.shape, None, on_device)
+    height, width = frame.indirect.shape[:2]
+    output, result = to_output(context, (height, width, 3), None, on_device)
     layers = {
         "sample": frame.indirect,
         "motion": bmfr.motion(frame),
@@ -89,7 +90,7 @@ def accumulate_light(
     arguments = (
         OFF_PLANE, SAME_NORMAL, parameters.light_share, layers["sample"], layers["surface"],
         layers["motion"], layers["normal"], layers["depth"], layers["position"], before.normal,
-        before.depth, before.position, history.count, history.light, light, count, accepted,
+        before.depth, before.position, history.samples, history.light, light, count, accepted,
     )  # fmt: skip
     defines = {"MOST": bmfr.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
     run_on_rows(context, "accumulate_light", (width, height), arguments, defines)
@@ -129,7 +130,7 @@ def taa(
     height, width = mean.shape[:2]
     smooth = context.empty(mean.shape)
     arguments = (
-        parameters.picture_share, DARK, picture, history.picture, history.count, layers["motion"],
+        parameters.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
         layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
     run_on_rows(context, "taa", (width, height), arguments)

@@ -19,7 +19,7 @@ def fit(
     light: Any,
     count: Any,
     layers: dict[str, Any],
-    number: int,
+    number: Any,
     block: int,
     noise: float,
 ) -> Any:

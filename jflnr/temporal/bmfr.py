@@ -48,14 +48,14 @@ class History(NamedTuple):
     """What a frame leaves to the next.
 
     number: how many frames there were, `()`. surface: of the last one; its depth is 0 where nothing
-    can be taken over. count: samples in `light`, `(H, W, 1)`, whole numbers. light: the accumulated
-    noisy light, fitted: the accumulated fitted light, picture: of that, multiplied by albedo, the
+    can be taken over. samples: how many are in `light`, `(H, W, 1)`. light: the accumulated noisy
+    light, fitted: the accumulated fitted light, picture: of that, multiplied by albedo, the
     result of TAA; all `(H, W, 3)`.
     """
 
-    number: jax.Array
+    number: jax.Array | int
     surface: Surface
-    count: jax.Array
+    samples: jax.Array
     light: jax.Array
     fitted: jax.Array
     picture: jax.Array
@@ -97,7 +97,7 @@ def step(
         squares=3,
     )
     fitted = accumulate_fitted(taps, history, fitted, count, parameters.fitted_share)
-    known = history.count > 0
+    known = history.samples > 0
     picture = smooth(frame.albedo * fitted, history.picture, known, moved, parameters.picture_share)
     bright = inside & (frame.albedo > DARK)
     image = jnp.where(bright, picture / jnp.where(bright, frame.albedo, 1), fitted)
@@ -151,7 +151,7 @@ def accumulate_light(
     was none.
     """
     usable = jnp.all(jnp.isfinite(light), axis=-1, keepdims=True)
-    count = jnp.minimum(jnp.round(gather(taps, history.count)) + usable, MOST_SAMPLES)
+    count = jnp.minimum(jnp.round(gather(taps, history.samples)) + usable, MOST_SAMPLES)
     share = jnp.where(usable, jnp.maximum(1 / jnp.maximum(count, 1), least), 0)
     before = gather(taps, history.light)
     return before + share * (jnp.where(usable, light, 0) - before), count

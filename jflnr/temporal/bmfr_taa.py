@@ -16,7 +16,7 @@ CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
 def smooth(
-    picture: jax.Array, before: jax.Array, known: Array, motion: Array, share: Array
+    picture: Array, before: Array, known: Array, motion: Array, share: Array | float
 ) -> jax.Array:
     """The picture mixed with its predecessor, which is first brought into the range around it.
 
@@ -34,7 +34,7 @@ def smooth(
     *sums, weight = (read(counted[..., c]) for c in range(4))
     was_there &= weight[..., None] > 0
     history = jnp.stack(sums, axis=-1) / jnp.where(was_there, weight[..., None], 1)
-    colour = picture @ jnp.array(YCOCG).T
+    colour = jnp.asarray(picture) @ jnp.array(YCOCG).T
     history = jnp.clip(history @ jnp.array(YCOCG).T, *neighbourhood(colour))
     mixed = history + share * (colour - history)
     return jnp.where(was_there, mixed @ jnp.array(RGB).T, picture)
@@ -46,7 +46,7 @@ def where_it_was(motion: Array) -> jax.Array:
     return jnp.stack([y + motion[..., 1], x + motion[..., 0]])
 
 
-def inside(place: jax.Array, size: tuple[int, int]) -> jax.Array:
+def inside(place: jax.Array, size: tuple[int, ...]) -> jax.Array:
     """Whether a place `(2, H, W)` lies among the pixels' centres, `(H, W)`; NaN does not."""
     last = jnp.array(size)[:, None, None] - 1
     return jnp.all((place >= 0) & (place <= last), axis=0)

@@ -19,7 +19,7 @@ from tests.temporal.bmfr_shot import shot
 
 step = jax.jit(bmfr.step, static_argnames="parameters", compiler_options=QUICK)
 # In the first frame `fitted` is phase II alone.
-PHASES = {"light": "I", "count": "I", "fitted": "II and III", "picture": "III"}
+PHASES = {"light": "I", "samples": "I", "fitted": "II and III", "picture": "III"}
 
 
 @pytest.fixture(scope="module")

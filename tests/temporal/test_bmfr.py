@@ -69,8 +69,8 @@ def test_light_is_the_mean_of_five_samples_then_fades(frames):
         mean += max(1 / number, 0.2) * (frame.indirect - mean)
     surface = frames[0].mask[..., 0] > 0
     np.testing.assert_allclose(history.light[surface], mean[surface], rtol=1e-4)
-    assert (np.asarray(history.count)[surface] == len(frames)).all()
-    assert not np.asarray(history.count)[~surface].any()
+    assert (np.asarray(history.samples)[surface] == len(frames)).all()
+    assert not np.asarray(history.samples)[~surface].any()
 
 
 def static_layers(frame):
@@ -81,7 +81,7 @@ def static_layers(frame):
 
 def test_moving_light_is_found_again_and_new_places_start_anew(frames, result):
     """What comes in at the left was there for the fewer frames the farther left it is."""
-    count = np.asarray(result[0].count)[..., 0]
+    count = np.asarray(result[0].samples)[..., 0]
     count = np.where(frames[-1].mask[..., 0] > 0, count, len(frames))
     assert (count[:, 0] == 1).all()
     assert (np.diff(count, axis=1) >= 0).all()
@@ -92,7 +92,7 @@ def test_moving_light_is_found_again_and_new_places_start_anew(frames, result):
 def test_another_surface_is_not_taken_over(frames):
     turned = changed(frames[1], normal=-frames[1].normal)
     history, _ = run([frames[0], turned])
-    np.testing.assert_array_equal(history.count, turned.mask)
+    np.testing.assert_array_equal(history.samples, turned.mask)
     np.testing.assert_array_equal(history.light, turned.indirect * turned.mask)
 
 
