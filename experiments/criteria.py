@@ -73,7 +73,7 @@ def gcv(mean_square: np.ndarray, freedom: np.ndarray, count: np.ndarray) -> np.n
 
     mean_square: of the residuals. count: effective number of pixels.
     """
-    return mean_square / np.maximum(1 - freedom / count, 1e-3) ** 2
+    return mean_square / np.maximum(1 - freedom / np.maximum(count, 1), 1e-3) ** 2
 
 
 def mallows(
@@ -81,7 +81,7 @@ def mallows(
 ) -> np.ndarray:
     """Mallows' Cp, for a linear smoother Stein's unbiased estimate: expected squared error of the
     model plus the noise's variance. noise: that variance."""
-    return mean_square + 2 * noise * freedom / count
+    return mean_square + 2 * noise * freedom / np.maximum(count, 1)
 
 
 def leave_out(sums: Sums, own: Sums, ridge: float) -> np.ndarray:

@@ -32,6 +32,7 @@ EXAMPLES = """\
   jflnr denoise render.exr -o out/ --direct --png --method flr-adaptive
   jflnr denoise shot/ -o clean/ --temporal --method flr-adaptive      a film, without flicker
   jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with the clean ones
+  jflnr denoise room.exr -o out/ --method auto --explain    what each frame needs, and why
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
 """
@@ -44,7 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
     add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
-    add("--method", default="flr", help="flr, flr-adaptive, flnr or bmfr (flr)")
+    add("--method", default="flr", help="flr, flr-adaptive, flnr, bmfr or auto (flr)")
+    add(
+        "--explain",
+        action="store_true",
+        help="with --method auto: print what it chose and why, and write a map, OUT.plan.png",
+    )
     add("--backend", default="jax", help="what runs it: jax or opencl (jax)")
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--params", type=Path, metavar="FILE", help="what `jflnr fit` or `train` wrote")

@@ -83,7 +83,8 @@ class Denoiser:
 
     def kept(self, job: Job) -> Record | None:
         """The record of a frame whose output is there and stays."""
-        outputs = [job.target, job.preview] if self.arguments.png else [job.target]
+        wanted = {job.preview: self.arguments.png, job.explanation: self.arguments.explain}
+        outputs = [job.target, *(path for path, asked in wanted.items() if asked)]
         kept = [str(path) for path in outputs if path.exists()]
         if not kept or self.arguments.overwrite:
             return None
@@ -179,6 +180,10 @@ class Denoiser:
 
             rows = profile(default_context(), lambda: denoise_light(noisy))
             record["profile"] = [row._asdict() for row in rows]
+        if arguments.explain:
+            from jflnr.cli.explain import explain
+
+            record["plan"] = explain(job.explanation, noisy, settings["guides"])
         if arguments.reference:
             images = {"noisy": frame.indirect, "denoised": lights["indirect"]}
             record["metrics"] = {name: measure(frame, image) for name, image in images.items()}

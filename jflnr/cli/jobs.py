@@ -20,6 +20,10 @@ class Job:
     def preview(self) -> Path:
         return self.target.with_suffix(".png")
 
+    @property
+    def explanation(self) -> Path:
+        return self.target.with_suffix(".plan.png")
+
 
 def expand(inputs: Sequence[Path]) -> list[Path]:
     """The EXR files meant: a file stands for itself, a folder for the `*.exr` in it, in order."""

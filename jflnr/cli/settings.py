@@ -14,6 +14,8 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     checks.choice("--backend", arguments.backend, BACKENDS)
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
+    if arguments.explain and arguments.method != "auto":
+        raise ValueError("--explain tells what --method auto chose, so it needs that method")
     if arguments.method != "flr":
         return _settings_of_another(arguments)
     model, about = parameters.DEFAULT, dict[str, Any]()

@@ -58,9 +58,11 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile", "error-map"):
+    for option in ("png", "reference", "profile", "error-map", "explain"):
         if getattr(arguments, option.replace("-", "_")):
             raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
+    if arguments.method == "auto":
+        raise ValueError("--method auto needs the whole frame in memory: raise --memory")
     if arguments.channels == "all":
         raise ValueError("--channels all needs the whole frame in memory: raise --memory")
 

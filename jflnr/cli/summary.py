@@ -37,6 +37,8 @@ def summary(record: dict[str, Any], verbose: bool) -> str:
     if verbose:
         lines = [f"guides: {', '.join(record['guides']) or 'none'}", *record["notes"]]
         text += "".join(f"\n  {line}" for line in [f"layout: {record['layout']}", *lines])
+    if "plan" in record:
+        text += "".join(f"\n  {line}" for line in record["plan"])
     if "metrics" in record:
         text += "\n" + metrics_table(record["metrics"])
     if "profile" in record:

@@ -52,6 +52,22 @@ def select_inputs(
     keep_energy: bool = False,
 ) -> tuple[plans.Plan, Array]:
     """`select` of what `prepare` returned. seconds: per pixel, of plain FLR on this device."""
+    plan, collected, models = _planned(frame, names, seconds, budget_ms, target_db)
+    if plan.form != plans.BLOCKS:
+        from jflnr.denoising import denoise
+
+        return plan, denoise(frame, plan.form, guides=names, keep_energy=keep_energy)
+    return plan, _apply(frame, collected, models, names, plan.guides, keep_energy)
+
+
+def _planned(
+    frame: Frame,
+    names: tuple[str, ...],
+    seconds: float | None,
+    budget_ms: float | None = None,
+    target_db: float | None = None,
+) -> tuple[plans.Plan, Collected, Models]:
+    """The plan, and the moments and models of the smallest form, which it rests on."""
     if frame.indirect.shape[:2] != frame.normal.shape[:2]:
         raise ValueError("method auto needs frame.indirect at the size of the guides")
     collected = _collect(frame, names)
@@ -61,12 +77,15 @@ def select_inputs(
     forms = plans.FORMS if network else plans.FORMS[:-1]
     limits = seconds, budget_ms, target_db
     plan = plans.plan(look, names, np.asarray(models.order), frame.depth.size, *limits, forms)
-    if plan.form != plans.BLOCKS:
-        from jflnr.denoising import denoise
+    if plan.form == plans.BLOCKS:
+        plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
+    return plan, collected, models
 
-        return plan, denoise(frame, plan.form, guides=names, keep_energy=keep_energy)
-    plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
-    return plan, _apply(frame, collected, models, names, plan.guides, keep_energy)
+
+def plan_of(frame: Frame, guides: Sequence[str] | None = None) -> plans.Plan:
+    """The plan that method `auto` follows for a frame, with the time predicted of it."""
+    names, inputs = prepare(frame, guides)
+    return _planned(inputs, names, plans.seconds_per_pixel())[0]
 
 
 def denoise_on_blocks(frame: Frame, guides: Sequence[str] | None = None) -> tuple[Array, Models]:

@@ -24,11 +24,11 @@ MEAN_BRIGHTNESS, GAMMA = 0.35, 2.2
 BLOCKS = "blocks"
 FORMS = (BLOCKS, "flr-adaptive", "flnr")
 # Time per pixel, in that of plain FLR with five guides.
-COSTS = dict(zip(FORMS, (1.2, 3.7, 4.0), strict=True))
+COSTS = dict(zip(FORMS, (1.4, 2.5, 2.9), strict=True))
 # What looking at a frame has cost when a larger form is taken after all.
-LOOK = 0.8
+LOOK = 0.9
 # Decibels that a form must bring for each further FLR of time.
-PRICE = 0.1
+PRICE = 0.3
 # A guide is read at every pixel if inside blocks it does more than this share of the squared error.
 WORTH = 1e-3
 
@@ -48,12 +48,12 @@ class Look(NamedTuple):
     width: float
 
 
-# Decibels = these times (1, decibels, share, noise, order, width): fitted on train by
-# `python -m experiments run criterion`.
+# Decibels = these times (1, decibels, share, noise, order, width): fitted on 97 training
+# frames at 1 and 4 samples per pixel (docs/select.md).
 PREDICTIONS = {
-    "blocks": (0.5, 1.0, 0.0, 0.0, 0.0, 0.0),
-    "flr-adaptive": (0.8, 1.0, 0.0, 0.0, 0.0, 0.0),
-    "flnr": (0.85, 1.0, 0.0, 0.0, 0.0, 0.0),
+    "blocks": (11.98, 0.3627, -3.287, -6.12, -2.359, 0.9175),
+    "flr-adaptive": (12.48, 0.3251, -1.754, -6.418, -2.199, 0.7396),
+    "flnr": (13.4, 0.2942, -1.867, -6.534, -2.246, 0.7748),
 }
 
 
@@ -63,7 +63,8 @@ class Plan:
 
     form: one of FORMS. guides: those used. decibels: predicted PSNR of every form. cost: predicted
     time of every form in that of plain FLR. milliseconds: on this device, of the chosen form; None
-    unless it was asked for. order: `(h, w)`, groups of guides in use, block by block.
+    unless it was asked for. order: `(h, w)`, how many of the `groups` of guides are in use, block
+    by block.
     """
 
     form: str
@@ -72,6 +73,7 @@ class Plan:
     cost: Mapping[str, float]
     milliseconds: float | None
     order: np.ndarray
+    groups: int
 
     def lines(self) -> list[str]:
         """The plan in a few lines for a person."""
@@ -82,7 +84,7 @@ class Plan:
             if form != self.form
         )
         time = "" if self.milliseconds is None else f", {self.milliseconds:.0f} ms predicted"
-        counts = np.bincount(np.round(self.order).astype(int).ravel(), minlength=1)
+        counts = np.bincount(np.round(self.order).astype(int).ravel(), minlength=self.groups + 1)
         shares = ", ".join(f"{n}: {count / counts.sum():.0%}" for n, count in enumerate(counts))
         return [
             f"plan: {self.form} with {', '.join(self.guides) or 'no guides'}, "
@@ -149,7 +151,7 @@ def plan(
     cost = {form: COSTS[form] + (0 if form == BLOCKS else LOOK) for form in forms}
     ms = None if seconds is None else {form: 1e3 * seconds * pixels * c for form, c in cost.items()}
     form = choose(decibels, cost, ms, budget_ms, target_db)
-    return Plan(form, names, decibels, cost, None if ms is None else ms[form], order)
+    return Plan(form, names, decibels, cost, None if ms is None else ms[form], order, len(names))
 
 
 def choose(
