@@ -41,7 +41,11 @@ def run(quick: bool) -> dict[str, Any]:
             rows += cells(case, precision, methods)
         bad = [f"{r['method']} {r['precision']}" for r in rows if r["case"] == case and misses(r)]
         print(f"  {case}: {'ours misses the bar: ' + ', '.join(bad) if bad else 'ok'}", flush=True)
-    return {"cells": rows, "fireflies": fireflies.run(quick)}
+    return {
+        "cells": rows,
+        "fireflies": fireflies.run(quick),
+        "real fireflies": fireflies.real(quick),
+    }
 
 
 def cells(name: str, precision: str, methods: dict[str, Method]) -> list[dict[str, Any]]:

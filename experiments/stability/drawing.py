@@ -142,6 +142,9 @@ def tables(result: dict[str, Any], path: Path) -> None:
     columns = {"spp": "spp", "fit": "fit", "typical": "median error", "error": "error"}
     text += "\nRobust fits under heavy-tailed noise, relative to the mean light:\n\n"
     text += results.table(result["fireflies"], columns | {"bias": "bias"})
+    text += "\nThe same on real frames, of the brightness:\n\n"
+    real = result["real fireflies"]
+    text += results.table(real, {"frame": "frame"} | columns | {"bias": "bias"})
     text += "\nEvery cell of float32 and float16 (the others are in stability.json):\n\n"
     some = [c for c in cells if c["precision"] in ("float32", "float16")]
     shown = [{k: "NaN" if v is None and k in _LOST else v for k, v in c.items()} for c in some]

@@ -8,10 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+import jflnr
+from experiments import data
 from experiments.stability.cases import room
 from experiments.stability.methods import SUPPORT
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
+from jflnr.guides import choose, layers
 
 SIZE = 36, 44
 PROBABILITY, ENERGY = 5e-5, 0.2  # of a firefly per sample; its share of the other light
@@ -23,21 +26,25 @@ def _fit(y: jax.Array, x: jax.Array, weight: jax.Array) -> jax.Array:
     return flr(y, x, DEFAULT, support=SUPPORT, weight=weight)
 
 
-def fit(name: str, noisy: np.ndarray, guides: np.ndarray) -> np.ndarray:
-    """Light `(H, W)` by one of `FITS`.
+def fit(
+    name: str, noisy: np.ndarray, guides: np.ndarray, usable: np.ndarray | None = None
+) -> np.ndarray:
+    """Light `(H, W)` by one of `FITS`, from the pixels `usable`, all if None.
 
     clamp at k: samples above k times the frame's median of positive ones are cut to that.
     one reweighting: a plain fit first, then one where a pixel that lies r times the typical
     residual away counts 1 / max(1, r / 3) (Huber's weights).
     """
-    x, ones = jnp.float32(guides), jnp.ones(noisy.shape, jnp.float32)
+    x, weight = jnp.float32(guides), jnp.ones(noisy.shape, jnp.float32)
+    if usable is not None:
+        weight = weight * usable
     if name.startswith("clamp"):
         noisy = np.minimum(noisy, float(name.split()[-1]) * np.median(noisy[noisy > 0]))
     y = jnp.float32(noisy[..., None])
-    light = _fit(y, x, ones)
+    light = _fit(y, x, weight)
     if name == "one reweighting":
         away = jnp.abs(y - light)[..., 0]
-        light = _fit(y, x, 1 / jnp.maximum(1, away / (3 * jnp.median(away))))
+        light = _fit(y, x, weight / jnp.maximum(1, away / (3 * jnp.median(away))))
     return np.asarray(light)[..., 0]
 
 
@@ -73,4 +80,30 @@ def run(quick: bool) -> list[dict[str, Any]]:
                     "bias": float(np.mean(off)) / scale,
                 }
             )
+    return rows
+
+
+def real(quick: bool) -> list[dict[str, Any]]:
+    """The same on real frames, of the brightness in the mask; veach-lamp is lit by small lamps
+    inside shades."""
+    rows = []
+    for path in data.frames("val")[:1] if quick else data.frames("val"):
+        for spp in (1, 16):
+            frame = jflnr.read_frame(path, spp)
+            assert frame.reference is not None
+            guides = np.concatenate(layers(frame, choose(frame, None)), axis=-1)
+            noisy, light = (np.mean(a, axis=-1) for a in (frame.indirect, frame.reference))
+            usable = light >= 0 if frame.mask is None else frame.mask[..., 0] > 0
+            for name in FITS:
+                off = (fit(name, noisy, guides, usable) - light)[usable] / light[usable].mean()
+                rows.append(
+                    {
+                        "frame": data.label(path),
+                        "spp": spp,
+                        "fit": name,
+                        "typical": float(np.median(np.abs(off))),
+                        "error": float(np.sqrt(np.mean(off**2))),
+                        "bias": float(np.mean(off)),
+                    }
+                )
     return rows

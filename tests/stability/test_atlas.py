@@ -11,8 +11,9 @@ from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
 from experiments.stability.measures import measure, passes
 from experiments.stability.methods import EXACT, METHODS
-from jflnr.flr.parameters import DEFAULT
+from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.regression import flr
+from jflnr.opencl import flr as on_device
 
 MANY = "16 guides, rank 5"
 
@@ -83,6 +84,31 @@ def test_gradients_are_finite(case):
     parameters = jax.tree.map(jnp.float32, DEFAULT)
     for gradient in jax.tree.leaves(_gradient()(target, guides, parameters, usable)):
         assert np.isfinite(gradient).all()
+
+
+# Without any regularisation only rounding says how much of a variance is known; the largest says
+# whether eps and eps' are cut before they overflow.
+LOGARITHMS = [(2.0, -1e3, -1e3), (2.0, 1e3, 1e3)]
+
+
+@pytest.mark.parametrize("logarithms", LOGARITHMS)
+@pytest.mark.parametrize("size", [1e-13, 1e4, 1e13])
+def test_equal_guides_without_regularisation(rng, size, logarithms):
+    y = rng.random((11, 13, 1), np.float32)
+    x = np.repeat(size * rng.standard_normal((11, 13, 1)), 2, axis=-1).astype(np.float32)
+    light, slopes = _unregularised()(y, x, Parameters(*map(np.float32, logarithms)))
+    assert np.isfinite(light).all() and np.abs(light).max() < 3
+    assert all(np.isfinite(slope).all() for slope in jax.tree.leaves(slopes))
+    _needs_a_device()
+    light = on_device(y, x, Parameters(*logarithms), block=4, support=16)
+    assert np.isfinite(light).all() and np.abs(light).max() < 3
+
+
+@functools.cache
+def _unregularised():
+    fit = functools.partial(flr, block=4, support=16)
+    slopes = jax.grad(lambda *a: jnp.mean(fit(*a)), argnums=(0, 1, 2))
+    return jax.jit(lambda *a: (fit(*a), slopes(*a)))
 
 
 def test_the_measures_notice_each_kind_of_failure():
