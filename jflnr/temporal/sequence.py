@@ -95,19 +95,25 @@ def step(
             f"the state is of frames of shape {state.light.mean.shape}, and this frame's indirect "
             f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
         )
-    parameters = _default(method) if parameters is None else parameters
+    parameters = _parameters(parameters, method)
     with jax.ensure_compile_time_eval():  # the width is a number also inside another's jit
         support = support_of(parameters, max(frame.motion.shape)) if method == "flr" else 0
     surface, temporal = Surface.of(frame), temporal or Temporal()
     return _step(state, inputs, frame.motion, surface, parameters, temporal, method, names, support)
 
 
-def _default(method: str) -> Any:
+def _parameters(given: Any, method: str) -> Any:
+    default: Any = DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
     if method in flnr.METHODS:
         from jflnr.flnr import weights
 
-        return weights.shipped(method)
-    return DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
+        default = weights.shipped(method)
+    if given is not None and type(given) is not type(default):
+        raise TypeError(
+            f"parameters of method {method} must be {type(default).__name__}; "
+            f"got {type(given).__name__}"
+        )
+    return default if given is None else given
 
 
 @functools.partial(jax.jit, static_argnames=("method", "names", "support"))
