@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 import jflnr
@@ -15,7 +17,7 @@ from experiments.resume import ROOT
 from experiments.timing import times
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
-from jflnr.frame import Array, Frame
+from jflnr.frame import Frame
 from jflnr.guides import layers
 from jflnr.metrics import measure
 from jflnr.selection.method import denoise_on_blocks, plan_of
@@ -85,11 +87,14 @@ def powers(path: Path) -> dict[str, Any]:
 
 
 def _with_squares(frame: Frame, name: str | None) -> float:
-    guides = layers(frame, ("normal", "depth", "ao"))
-    added: tuple[Array, ...] = () if name is None else (layers(frame, (name,))[0] ** 2,)
-    weight = None if frame.mask is None else np.asarray(frame.mask)[..., 0]
-    image = flr(frame.indirect, (*guides, *added), DEFAULT, weight=weight)
+    added = () if name is None else (layers(frame, (name,))[0] ** 2,)
+    guides = (*layers(frame, ("normal", "depth", "ao")), *added)
+    weight = None if frame.mask is None else jnp.asarray(frame.mask)[..., 0]
+    image = _flr(jnp.asarray(frame.indirect), guides, DEFAULT, weight=weight)
     return float(measure(frame, image)["psnr"] or 0)
+
+
+_flr = jax.jit(flr)
 
 
 def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -78,7 +78,7 @@ def _strip(planes: jax.Array, shift: jax.Array, groups: tuple[int, ...], channel
     explained = jnp.stack(
         [jnp.sum(added[e - d : e], axis=0) for d, e in zip(groups, ends, strict=True)]
     )
-    shares = signal_share(explained, np.array(groups)[:, None, None] * noise)
+    shares = signal_share(explained, jnp.array(groups)[:, None, None] * noise)
     each = jnp.repeat(shares, np.array(groups), axis=0)
     slopes = substitute(upper, each) * system.scale[:, None]
     value = system.mean_y - jnp.sum(system.mean_x[:, None] * slopes, axis=0)
