@@ -93,7 +93,7 @@ def real(quick: bool) -> list[dict[str, Any]]:
             assert frame.reference is not None
             guides = np.concatenate(layers(frame, choose(frame, None)), axis=-1)
             noisy, light = (np.mean(a, axis=-1) for a in (frame.indirect, frame.reference))
-            usable = light >= 0 if frame.mask is None else frame.mask[..., 0] > 0
+            usable = light >= 0 if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
             for name in FITS:
                 off = (fit(name, noisy, guides, usable) - light)[usable] / light[usable].mean()
                 rows.append(
