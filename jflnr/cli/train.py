@@ -104,7 +104,7 @@ def _read(paths: Sequence[Path], seed: int) -> list:
     found = []
     for some in tqdm(examples.read(paths, seed), "reading", len(paths), leave=False, disable=None):
         found += some
-    print(f"frames: {len(paths)}, examples: {len(found)}", flush=True)
+    print(f"frames: {len(paths)}, crops: {len(found)}", flush=True)
     return found
 
 
@@ -146,7 +146,7 @@ def _write(
         result.params,
         settings.widths,
         frames=len(paths),
-        examples=count,
+        crops=count,
         data=examples.digest(paths),
         steps=result.best.step,
         validation_psnr=round(result.best.validation, 3),

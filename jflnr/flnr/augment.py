@@ -16,8 +16,6 @@ PACKED = features.OF_GRID + features.OF_STEP + features.CHANNELS
 def augment(key: jax.Array, example: Example) -> Example:
     """Mirror the crop and permute its channels, at random."""
     keys = jax.random.split(key, 3)
-    known = example.prepared
-    example = example._replace(prepared=known._replace(x=known.x.astype(known.mean.dtype)))
     example = _recolour(example, jax.random.permutation(keys[0], features.CHANNELS))
     for axis, own in enumerate(keys[1:]):
         example = _mirror(example, axis, jax.random.bernoulli(own))

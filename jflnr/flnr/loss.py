@@ -28,8 +28,8 @@ def to_reference(params: unet.Params, example: Example) -> jax.Array:
 
     Decibels, since PSNR is what pictures are judged by: every frame counts alike.
     """
-    target = example.target.astype(jnp.float32)
-    picture = light(params, example) * example.albedo.astype(jnp.float32) * example.exposure
+    target = example.target
+    picture = light(params, example) * example.albedo * example.exposure
     error = jnp.mean((_shown(picture) - _shown(jnp.minimum(target, 1))) ** 2)
     smape = jnp.mean(jnp.abs(picture - target) / (jnp.abs(picture) + target + 0.01))
     return 10 * jnp.log10(error + FLOOR) + SMAPE * smape
@@ -37,8 +37,8 @@ def to_reference(params: unet.Params, example: Example) -> jax.Array:
 
 def to_noisy(params: unet.Params, example: Example) -> jax.Array:
     """For a target with noise of its own: `relative`."""
-    target = example.target.astype(jnp.float32)
-    picture = light(params, example) * example.albedo.astype(jnp.float32) * example.exposure
+    target = example.target
+    picture = light(params, example) * example.albedo * example.exposure
     return relative(picture, target)
 
 

@@ -18,7 +18,7 @@ from jflnr.flnr import loss, regression, unet
 from jflnr.flnr.adam import Adam
 from jflnr.flnr.augment import augment
 from jflnr.flnr.checkpoint import load_state, save_state
-from jflnr.flnr.examples import Example, prepared
+from jflnr.flnr.examples import Crop, Example, draw, prepared
 from jflnr.flr.apply import apply
 from jflnr.frame import Frame
 
@@ -31,9 +31,9 @@ CONFIGS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What a run is made of; with the examples it decides the trajectory.
+    """What a run is made of; with the crops it decides the trajectory.
 
-    batch: examples per step. rate: size of the first steps, which shrinks slowly. every: steps
+    batch: crops per step. rate: size of the first steps, which shrinks slowly. every: steps
     between validations. noisy_targets: whether targets have noise of their own.
     """
 
@@ -62,7 +62,7 @@ class Result(NamedTuple):
 
 
 def train(
-    examples: Sequence[Example],
+    crops: Sequence[Crop],
     validation: Sequence[Frame],
     settings: Settings,
     *,
@@ -73,27 +73,27 @@ def train(
 ) -> Result:
     """Train until `stop(step)`; with a `state_file` that exists, go on where it was written.
 
-    Steps depend on the settings, the examples and their number only, so a run that was interrupted
-    and one that was not come to the same weights. The batch is divided over all local devices.
+    Steps depend on the settings, the crops and their number only, so a run that was interrupted and
+    one that was not come to the same weights. The batch is divided over all local devices.
 
     Raises `ValueError` if there is nothing to train on, or if the state is of another run.
     """
-    if not examples:
-        raise ValueError("examples is empty: no frame shows enough surface and light")
+    if not crops:
+        raise ValueError("crops is empty: no frame shows enough surface and light")
     params = initial or regression.init(jax.random.key(settings.seed), settings.widths)
     solver = Adam(_batch_loss(settings), _rate(settings))
     state = solver.init_state(params)
     score = Validation(validation)
     history = [Progress(0, float("nan"), score(params))]
     best, top = params, history[0]
-    run = {"settings": repr(settings), "examples": len(examples)}
+    run = {"settings": repr(settings), "crops": len(crops)}
     if state_file is not None and state_file.exists():
         (params, state, best), saved = load_state(state_file, (params, state, best), run)
         history = [Progress(*entry) for entry in saved]
         top = max(history, key=lambda entry: (np.nan_to_num(entry.validation), entry.step))
     update = jax.jit(solver.update)
     step, losses = int(state.iter_num), list[float]()
-    with Batches(examples, settings) as batches:
+    with Batches(crops, settings) as batches:
         while not stop(step):
             params, state = update(params, state, data=batches(step))
             losses.append(float(state.value))
@@ -130,9 +130,8 @@ def _batch_loss(settings: Settings) -> Callable[..., jax.Array]:
 class Batches:
     """Batches by the number of the step, each drawn while the one before is worked on."""
 
-    def __init__(self, examples: Sequence[Example], settings: Settings) -> None:
-        shares = np.array([float(example.share) for example in examples])
-        self.examples, self.settings, self.shares = examples, settings, shares / shares.sum()
+    def __init__(self, crops: Sequence[Crop], settings: Settings) -> None:
+        self.crops, self.settings = crops, settings
         devices = jax.local_devices()
         if settings.batch % len(devices):
             raise ValueError(
@@ -157,9 +156,11 @@ class Batches:
 
     def _draw(self, step: int) -> tuple[np.ndarray, Example]:
         random = np.random.default_rng([self.settings.seed, step])
-        chosen = random.choice(len(self.examples), self.settings.batch, p=self.shares)
+        chosen = random.choice(len(self.crops), self.settings.batch)
         keys = random.integers(2**32, size=(self.settings.batch, 2), dtype=np.uint32)
-        return keys, jax.tree.map(lambda *a: np.stack(a), *(self.examples[i] for i in chosen))
+        return keys, jax.tree.map(
+            lambda *a: np.stack(a), *(draw(self.crops[i], random) for i in chosen)
+        )
 
 
 class Validation:

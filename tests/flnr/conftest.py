@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jflnr.flnr import regression
-from jflnr.flnr.examples import Example
+from jflnr.flnr.examples import Crop, Example, draw, read
 from jflnr.frame import Frame, write_frame
 
 if TYPE_CHECKING:
@@ -71,10 +71,13 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def examples(frames: Path) -> list[Example]:
-    from jflnr.flnr.examples import read
+def crops(frames: Path) -> list[Crop]:
+    return [crop for some in read(sorted(frames.glob("*.exr")), 0) for crop in some]
 
-    return [example for some in read(sorted(frames.glob("*.exr")), 0) for example in some]
+
+@pytest.fixture
+def example(crops: list[Crop]) -> Example:
+    return jax.tree.map(jnp.asarray, draw(crops[0], np.random.default_rng(0)))
 
 
 @pytest.fixture
@@ -82,10 +85,3 @@ def settings() -> "Settings":
     from jflnr.flnr.train import Settings
 
     return Settings(widths=WIDTHS, batch=2, every=2)
-
-
-def as_jax(example: Example) -> Example:
-    """As it comes to the loss: arrays of JAX, in float32."""
-    example = jax.tree.map(jnp.asarray, example)
-    known = example.prepared
-    return example._replace(prepared=known._replace(x=known.x.astype(jnp.float32)))

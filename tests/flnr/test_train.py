@@ -14,7 +14,7 @@ from jflnr.flnr import examples as reading
 from jflnr.flnr import loss, regression, train
 from jflnr.flnr.adam import Adam
 from jflnr.flnr.augment import _mirror, augment
-from tests.flnr.conftest import WIDTHS, as_jax
+from tests.flnr.conftest import WIDTHS
 
 
 def test_adam_is_the_papers_algorithm():
@@ -48,10 +48,9 @@ def test_a_step_whose_gradient_overflows_is_left_out():
     assert float(moved) == 1
 
 
-def test_augmenting_shows_the_same_scene(examples):
+def test_augmenting_shows_the_same_scene(example):
     """Mirrored or recoloured, the untrained denoiser errs as much."""
     start = regression.init(jax.random.key(0), WIDTHS)
-    example = as_jax(examples[0])
     plain = float(loss.to_reference(start, example))
     other = jax.jit(lambda key: augment(key, example))
     many = [other(jax.random.key(seed)) for seed in range(4)]
@@ -60,35 +59,35 @@ def test_augmenting_shows_the_same_scene(examples):
     assert any(np.abs(changed.guides - example.guides).max() > 0.1 for changed in many)
 
 
-def test_augmented_inputs_are_those_of_the_mirrored_frame(scene, examples):
+def test_augmented_inputs_are_those_of_the_mirrored_frame(scene, example):
     """What the network reads of a mirrored example is the example's of the mirrored frame."""
     prepare = jax.jit(lambda target, guides: regression.prepare(target, guides, None)[0])
     target, guides = (a[:32, :32] for a in scene)
     mirrored = prepare(target[:, ::-1], guides[:, ::-1])
-    example = as_jax(examples[0])._replace(prepared=prepare(target, guides))
+    example = example._replace(prepared=prepare(target, guides))
     ours = _mirror(example, 1, jnp.asarray(True)).prepared
     # The guides' shift is taken from other pixels, which rounding shows.
     for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(mirrored), strict=True):
         np.testing.assert_allclose(mine, other, rtol=1e-2, atol=1e-2 * np.abs(other).max())
 
 
-def test_going_on_gives_the_same_weights(examples, settings, tmp_path):
-    whole = train.train(examples, [], settings, stop=lambda step: step >= 4)
+def test_going_on_gives_the_same_weights(crops, settings, tmp_path):
+    whole = train.train(crops, [], settings, stop=lambda step: step >= 4)
     state = tmp_path / "state"
-    train.train(examples, [], settings, state_file=state, stop=lambda step: step >= 2)
-    rest = train.train(examples, [], settings, state_file=state, stop=lambda step: step >= 4)
+    train.train(crops, [], settings, state_file=state, stop=lambda step: step >= 2)
+    rest = train.train(crops, [], settings, state_file=state, stop=lambda step: step >= 4)
     for name, value in whole.params.items():
         np.testing.assert_array_equal(rest.params[name], value)
     assert [entry.step for entry in rest.history] == [0, 2, 4]
     other = dataclasses.replace(settings, seed=1)
     with pytest.raises(ValueError, match="another run"):
-        train.train(examples, [], other, state_file=state, stop=lambda step: True)
+        train.train(crops, [], other, state_file=state, stop=lambda step: True)
 
 
-def test_a_state_that_is_none_is_refused(examples, settings, tmp_path):
+def test_a_state_that_is_none_is_refused(crops, settings, tmp_path):
     (tmp_path / "state").write_bytes(b"no state")
     with pytest.raises(ValueError, match="not the state of a training run"):
-        train.train(examples, [], settings, state_file=tmp_path / "state", stop=lambda step: True)
+        train.train(crops, [], settings, state_file=tmp_path / "state", stop=lambda step: True)
 
 
 def test_noise_as_target_has_its_least_loss_at_the_mean(rng):
@@ -128,8 +127,8 @@ print(len(jax.local_devices()), result.history[-1].loss)
 """
 
 
-def test_two_devices_find_the_same_loss(frames, examples, settings):
-    one = train.train(examples, [], settings, stop=lambda step: step >= 1)
+def test_two_devices_find_the_same_loss(frames, crops, settings):
+    one = train.train(crops, [], settings, stop=lambda step: step >= 1)
     code = TWO_DEVICES.format(root=os.getcwd(), folder=str(frames))
     flags = {"XLA_FLAGS": "--xla_force_host_platform_device_count=2", "JAX_PLATFORMS": "cpu"}
     done = subprocess.run(

@@ -43,7 +43,6 @@ def example(rng):
         albedo=rng.uniform(0.2, 0.8, (24, 32, 3)),
         target=rng.uniform(0.2, 0.6, (24, 32, 3)),
         exposure=np.array(0.3),
-        share=np.array(1.0),
     )
 
 
