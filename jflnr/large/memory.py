@@ -14,8 +14,8 @@ SHARE = 0.5
 BASE = 450 * 2**20
 WHOLE, REST = 320, 1
 PIECE = {"flr": 230, "flr-adaptive": 160}
-# Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` do.
-STRIP_OVERLAP, TILE_OVERLAP = 200, 1664
+# Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` and `flnr` do.
+STRIP_OVERLAP, TILE_OVERLAP, NETWORK_OVERLAP = 200, 1664, 2048
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
 
@@ -49,7 +49,7 @@ def tile_for(
     if method == "flr":
         side = max(area - STRIP_OVERLAP * width, 0) ** 0.5
     elif area > 0:
-        side = area**0.5 - TILE_OVERLAP
+        side = area**0.5 - _tile_overlap(method)
     if side < SMALLEST:
         raise ValueError(
             f"--memory: {memory / 2**20:.0f}M are too little for {width} x {height} pixels with "
@@ -63,5 +63,9 @@ def _least(pixels: int, width: int, method: str) -> int:
     if method == "flr":
         area = SMALLEST**2 + STRIP_OVERLAP * width
     else:
-        area = (SMALLEST + TILE_OVERLAP) ** 2
+        area = (SMALLEST + _tile_overlap(method)) ** 2
     return BASE + REST * pixels + PIECE.get(method, max(PIECE.values())) * area
+
+
+def _tile_overlap(method: str) -> int:
+    return TILE_OVERLAP if method == "flr-adaptive" else NETWORK_OVERLAP
