@@ -34,11 +34,12 @@ INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal
 // its count is 0 nothing is taken from it. accepted: bit i for tap i, for phase III.
 kernel void accumulate_light(
     int width, int height, float off_plane, float same_normal, float least,
-    global const float *sample, global const float *surface, global const float *motion, global const float *normal,
-    global const float *depth, global const float *position, global const float *before_normal,
-    global const float *before_depth, global const float *before_position,
-    global const float *before_count, global const float *before_light, global float *light,
-    global float *count, global uchar *accepted)
+    global const float *sample, global const float *surface, global const float *motion,
+    global const float *normal, global const float *depth, global const float *position,
+    global const float *before_normal, global const float *before_depth,
+    global const float *before_position, global const float *before_count,
+    global const float *before_light, global float *light, global float *count,
+    global uchar *accepted)
 {
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;

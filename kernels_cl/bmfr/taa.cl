@@ -37,13 +37,13 @@ INLINE void neighbourhood(
 }
 
 // Global size (W / WIDTH, H). picture: (3, H, W), from accumulate_fitted. before: (H, W, 3), the previous
-// result, whose pixels count where before_count, (H, W), is above 0. surface: (H, W). result: (H, W, 3). image: the same divided by albedo, or, where that is at
-// most `dark`, the mean of phase III.
+// result, whose pixels count where before_count, (H, W), is above 0. surface: (H, W). result: (H, W, 3).
+// image: the same divided by albedo, or, where that is at most `dark`, the mean of phase III.
 kernel void taa(
     int width, int height, float share, float dark, global const float *picture,
-    global const float *before, global const float *before_count, global const float *motion, global const float *albedo,
-    global const float *surface, global const float *mean, global float *result,
-    global float *image)
+    global const float *before, global const float *before_count, global const float *motion,
+    global const float *albedo, global const float *surface, global const float *mean,
+    global float *result, global float *image)
 {
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
