@@ -14,7 +14,7 @@ from jflnr.metrics import display
 from jflnr.temporal_metrics import sequence_exposure
 
 SHOT = "sponza_camera"
-PANELS = ("noisy", "flnr", "BMFR", "flr-adaptive, temporal")
+PANELS = ("noisy", "flnr", "BMFR", "flnr, temporal")
 CROP = (slice(20, 164), slice(40, 296))
 MILLISECONDS = 120
 
