@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -184,7 +185,7 @@ def support_of(parameters: Parameters, longest: int) -> int:
     """
     if isinstance(parameters.log_sigma, jax.core.Tracer):
         return 72
-    reach = min(float(parameters.sigma) * 3, longest)
+    reach = min(3 * math.exp(float(parameters.log_sigma)), longest)
     return 24 * max(int(np.ceil(reach / 24)), 1)
 
 

@@ -96,8 +96,7 @@ def step(
             f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
         )
     parameters = _parameters(parameters, method)
-    with jax.ensure_compile_time_eval():  # the width is a number also inside another's jit
-        support = support_of(parameters, max(frame.motion.shape)) if method == "flr" else 0
+    support = support_of(parameters, max(frame.motion.shape)) if method == "flr" else 0
     surface, temporal = Surface.of(frame), temporal or Temporal()
     return _step(state, inputs, frame.motion, surface, parameters, temporal, method, names, support)
 
