@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--data", metavar="FRAMES", nargs="+", type=Path, required=True, help="frames, folders")
     add("--val", metavar="FRAMES", nargs="+", type=Path, default=[], help="frames to choose by")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help=".npz file to write")
-    add("--config", default="tiny", help="tiny, small or base: the size of the network (tiny)")
+    add("--config", default="base", help="tiny, small or base: the size of the network (base)")
     add("--time", type=seconds, default="1h", metavar="T", help="how long, such as 90s or 3h (1h)")
     add("--steps", type=int, metavar="N", help="stop after N steps at the latest")
     add("--batch", type=int, default=4, metavar="N", help="crops per step (4)")

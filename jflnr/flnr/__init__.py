@@ -1,3 +1,4 @@
 """FLNR: adaptive FLR steered by a small network (section 3.3 of the paper)."""
 
-METHODS = ("flnr",)
+# From the smallest network to the largest.
+METHODS = ("flnr-tiny", "flnr-small", "flnr")

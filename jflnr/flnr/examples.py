@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
@@ -15,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr import exr
-from jflnr.flnr import features
-from jflnr.flnr.regression import Prepared, prepare
+from jflnr.flnr import features, method
+from jflnr.flnr.regression import Prepared
 from jflnr.frame import Frame, read_frame
-from jflnr.inputs import adaptive_images, frame_inputs
+from jflnr.inputs import frame_inputs
 from jflnr.metrics import MEAN_BRIGHTNESS
 
 # Sides of a crop: whole blocks on the coarsest grid, so that flipping a crop flips all grids.
@@ -65,7 +64,8 @@ def read(paths: Sequence[Path], seed: int) -> Iterator[list[Crop]]:
     for path in paths:
         random = np.random.default_rng([seed, *path.name.encode()])
         frame, light = _layers(path)
-        places = _places(*frame.depth.shape[:2], random)
+        height, width = frame.depth.shape[:2]
+        places = _places(height, width, random)
         found = (
             Crop(_cut(frame, at), {spp: a[:, *at] for spp, a in light.items()}) for at in places
         )
@@ -89,8 +89,8 @@ def _layers(path: Path) -> tuple[Frame, dict[int, np.ndarray]]:
     light = {spp: np.stack(layers) for spp, layers in found.items() if len(layers) >= least}
     if not light or frame.ao is None:
         raise ValueError(f"{path}: needs a layer ao, and reference or two of the same indirect_N")
-    unused = dict.fromkeys(("indirect", "direct", "emission", "position", "reference_a", "motion"))
-    return dataclasses.replace(frame, **unused), light
+    kept = frame_inputs(frame, features.GUIDES)
+    return dataclasses.replace(kept, albedo=frame.albedo, reference=frame.reference), light
 
 
 def _places(height: int, width: int, random: np.random.Generator) -> Iterator[tuple[slice, slice]]:
@@ -117,7 +117,7 @@ def _wanted(crop: Crop) -> np.ndarray:
     """What its mean brightness is taken from: the reference, or else the mean of what there is."""
     if crop.frame.reference is not None:
         return np.asarray(crop.frame.reference)
-    return np.mean(crop.light[max(crop.light)], axis=0, dtype=np.float32)
+    return np.asarray(np.mean(crop.light[max(crop.light)], axis=0, dtype=np.float32))
 
 
 def draw(crop: Crop, random: np.random.Generator) -> Example:
@@ -148,14 +148,8 @@ def mixed(images: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 def prepared(frame: Frame) -> tuple[Prepared, np.ndarray, np.ndarray]:
     """What precedes the network for one frame, the shift and the guides `(H, W, Q)`."""
-    return jax.tree.map(np.asarray, _prepared(frame_inputs(frame, features.GUIDES)))
-
-
-@functools.partial(jax.jit)
-def _prepared(frame: Frame) -> tuple[Prepared, jax.Array, jax.Array]:
-    images = adaptive_images(frame, features.GUIDES)
-    known, shift = prepare(images["target"], images["guides"], images["weight"])
-    return known, shift, jnp.concatenate(images["guides"], axis=-1)
+    known, shift, guides = method.prepared(frame_inputs(frame, features.GUIDES))
+    return jax.tree.map(np.asarray, (known, shift, jnp.concatenate(guides, axis=-1)))
 
 
 def has_reference(path: Path) -> bool:

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 
 from jflnr.flnr import regression, unet
 from jflnr.flnr.examples import Example
-from jflnr.flr.apply import apply
 from jflnr.metrics import GAMMA
 
 # Mean squared error of a picture that is as good as its reference, whose noise is not ours to fit.
@@ -19,8 +18,7 @@ DARKEST = 1e-3
 
 def light(params: unet.Params, example: Example) -> jax.Array:
     """The denoised light of one example, `(H, W, 3)`."""
-    models = regression.finish(params, example.prepared)
-    return apply(models, example.guides, example.shift, regression.BLOCK)
+    return regression.evaluate(params, example.prepared, example.shift, example.guides)
 
 
 def to_reference(params: unet.Params, example: Example) -> jax.Array:

@@ -6,10 +6,12 @@ import functools
 from collections.abc import Sequence
 
 import jax
+import jax.numpy as jnp
 
 from jflnr.flnr import features, regression, unet, weights
 from jflnr.flr.adaptive import light_of
 from jflnr.flr.energy import rescale
+from jflnr.flr.moments import Guides
 from jflnr.frame import Array, Frame
 from jflnr.inputs import adaptive_images
 
@@ -29,7 +31,8 @@ def denoise_flnr(
     Returns `(H, W, 3)`. Raises as `check` does.
     """
     check(method, names, frame.indirect.shape, frame.normal.shape)
-    return _denoise(frame, weights.shipped(method) if params is None else params, keep_energy)
+    params = weights.shipped(method) if params is None else params
+    return _finished(params, *prepared(frame), frame, keep_energy)
 
 
 def check(
@@ -49,9 +52,28 @@ def check(
         )
 
 
-@functools.partial(jax.jit, static_argnames="keep_energy")
-def _denoise(frame: Frame, params: unet.Params, keep_energy: bool) -> jax.Array:
+@jax.jit
+def prepared(frame: Frame) -> tuple[regression.Prepared, jax.Array, Guides]:
+    """What precedes the network, the shift of the guides and the guides themselves.
+
+    A program of its own, which networks of all sizes share.
+    """
     images = adaptive_images(frame, features.GUIDES)
-    target, guides, weight = images["target"], images["guides"], images["weight"]
-    image = regression.flnr(target, guides, params, weight=weight)
-    return rescale(image, light_of(target), weight) if keep_energy else image
+    guides = images["guides"]
+    return *regression.prepare(images["target"], guides, images["weight"]), guides
+
+
+@functools.partial(jax.jit, static_argnames="keep_energy")
+def _finished(
+    params: unet.Params,
+    known: regression.Prepared,
+    shift: jax.Array,
+    guides: Guides,
+    frame: Frame,
+    keep_energy: bool,
+) -> jax.Array:
+    image = regression.evaluate(params, known, shift, guides)
+    if not keep_energy:
+        return image
+    weight = None if frame.mask is None else jnp.asarray(frame.mask[..., 0] > 0)
+    return rescale(image, light_of(jnp.asarray(frame.indirect)), weight)

@@ -63,7 +63,7 @@ def flnr(
     """
     check_regression(target, guides, None, weight, 2 * BLOCK, 1)
     frame, shift = prepare(target, guides, weight)
-    return apply(finish(params, frame), guides, shift, BLOCK)
+    return evaluate(params, frame, shift, guides)
 
 
 def init(key: jax.Array, widths: Sequence[int], channels: int = 3) -> unet.Params:
@@ -119,6 +119,11 @@ def finish(params: unet.Params, frame: Prepared) -> jax.Array:
     # A gain acts on a little light even where the models predict none.
     floor = features.DARK * frame.mean
     return jnp.concatenate([(merged[:1] + floor) * gain - floor, merged[1:] * gain])
+
+
+def evaluate(params: unet.Params, frame: Prepared, shift: jax.Array, guides: Guides) -> jax.Array:
+    """The denoised light `(H, W, C)` of a frame from `prepare`."""
+    return apply(finish(params, frame), guides, shift, BLOCK)
 
 
 def changed(share: jax.Array, change: jax.Array) -> jax.Array:

@@ -19,13 +19,13 @@ from jflnr.flnr.adam import Adam
 from jflnr.flnr.augment import augment
 from jflnr.flnr.checkpoint import load_state, save_state
 from jflnr.flnr.examples import Crop, Example, draw, prepared
-from jflnr.flr.apply import apply
 from jflnr.frame import Frame
 
+# Channels of the network, fine to coarse: of flnr-tiny, flnr-small and flnr.
 CONFIGS = {
-    "tiny": (16, 24, 32),
-    "small": (32, 48, 64),
-    "base": (48, 64, 96),
+    "tiny": (8, 12, 16),
+    "small": (16, 24, 32),
+    "base": (32, 48, 64),
 }
 
 
@@ -37,7 +37,7 @@ class Settings:
     between validations. noisy_targets: whether targets have noise of their own.
     """
 
-    widths: tuple[int, ...] = CONFIGS["tiny"]
+    widths: tuple[int, ...] = CONFIGS["base"]
     seed: int = 0
     batch: int = 4
     rate: float = 1e-3
@@ -168,7 +168,7 @@ class Validation:
 
     def __init__(self, frames: Sequence[Frame]) -> None:
         self.known = [(frame, prepared(frame)) for frame in frames]
-        self.image = jax.jit(_image)
+        self.image = jax.jit(regression.evaluate)
 
     def __call__(self, params: unet.Params) -> float:
         """In dB, by the protocol of DESIGN.md; NaN without frames."""
@@ -188,9 +188,3 @@ class Validation:
         wanted = albedo * reference.astype(np.float64)
         scale = metrics.exposure(wanted)
         return metrics.psnr(metrics.display(albedo * light, scale), metrics.display(wanted, scale))
-
-
-def _image(
-    params: unet.Params, known: regression.Prepared, shift: jax.Array, guides: jax.Array
-) -> jax.Array:
-    return apply(regression.finish(params, known), guides, shift, regression.BLOCK)

@@ -37,8 +37,9 @@ def solve_strips(
     def solve_some(strip: jax.Array, models: jax.Array) -> jax.Array:
         # The last strip ends with the grid; what it shares with the one before is the same.
         first = jnp.minimum(strip * rows, height - rows)
-        some = [lax.dynamic_slice_in_dim(a, first, rows, axis=1) for a in (moments, regular)]
-        solved = _solve(*lax.optimization_barrier(some), shift, channels)
+        some, own = (lax.dynamic_slice_in_dim(a, first, rows, axis=1) for a in (moments, regular))
+        some, own = lax.optimization_barrier((some, own))
+        solved = _solve(some, own, shift, channels)
         return lax.dynamic_update_slice_in_dim(models, solved, first, axis=2)
 
     models = jnp.zeros((shift.size + 1, channels, height, width), moments.dtype)
@@ -46,7 +47,7 @@ def solve_strips(
 
 
 def _solve(moments: jax.Array, regular: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
-    system = normal_equations(moments, shift, *regular, channels)
+    system = normal_equations(moments, shift, regular[0], regular[1], channels)
     if not shift.size:
         return system.mean_y[None]
     both = jnp.concatenate([system.correlation, system.right], axis=1)
