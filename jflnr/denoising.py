@@ -44,9 +44,10 @@ def denoise(
     groups side by side are denoised together, and their results sum to the denoised sum. It may
     also be smaller than the other layers by a whole factor; the result then has their size.
     method: `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`, the same
-    steered by a network, `flnr-small` or `flnr-tiny`, by a smaller one (docs/flnr.md), `bmfr`, as in
-    the first frame of a sequence (docs/bmfr.md), which takes neither guides nor any of the options
-    below, or `auto`, the smallest model that is good enough for the frame (docs/select.md).
+    steered by a network, `flnr-small` or `flnr-tiny`, by a smaller one (docs/flnr.md), `bmfr`, as
+    in the first frame of a sequence (docs/bmfr.md), which takes neither guides nor any of the
+    options below, or `auto`, the smallest model that is good enough for the frame
+    (docs/select.md).
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao. parameters: of the method, for flnr weights from `flnr.weights.load`; the
     fitted defaults if None.
