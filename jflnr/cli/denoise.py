@@ -45,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
     add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
-    add("--method", default="flr", help="flr, flr-adaptive, flnr, flnr-small, flnr-tiny, bmfr, auto (flr)")
+    add(
+        "--method", default="flr", help="flr, flr-adaptive, flnr[-small, -tiny], bmfr or auto (flr)"
+    )
     add(
         "--explain",
         action="store_true",
