@@ -19,7 +19,7 @@ from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.apply import apply, apply_rows, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
-from jflnr.flr.level import Fit, Grid, brightness, fit_level
+from jflnr.flr.level import Fit, Grid, brightness, fit_level, windowed
 from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude
 from jflnr.flr.pyramid import halve
 from jflnr.flr.weighted_moments import collect_weighted
@@ -136,7 +136,8 @@ def fit_pilot(
     """Models of the brightness from the moments of pass 1. Returns `(Q + 1, 1, h, w)`."""
     grid = Grid(halve(moments), jnp.zeros_like(halve(moments[:1])), 4 * block)
     features = guide_features(grid, shift.size, numbers)
-    return fit_level(grid, features, shift, 1, mean, numbers).coefficients
+    system = windowed(grid, features, shift, 1, mean, numbers)
+    return fit_level(system, shift.size, 1).coefficients
 
 
 def collect_grid(

@@ -81,21 +81,11 @@ class Windowed(NamedTuple):
     window: Window
 
 
-def fit_level(
-    grid: Grid,
-    features: jax.Array,
-    shift: jax.Array,
-    channels: int,
-    mean: jax.Array,
-    numbers: AdaptiveParameters,
-    *,
-    slopes: bool = True,
-) -> Fit:
-    """Fit the models of one level; arguments as of `windowed`."""
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
+def fit_level(system: Windowed, guides: int, channels: int) -> Fit:
+    """The models of one level, of the guides alone, from `windowed`."""
     regular = system.eps, system.eps_prime
     coefficients = solve_strips(system.moments, system.shift, *regular, channels)
-    return Fit(coefficients[: shift.size + 1], system.variance, system.window)
+    return Fit(coefficients[: guides + 1], system.variance, system.window)
 
 
 def windowed(

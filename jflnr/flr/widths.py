@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict
+from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict, windowed
 from jflnr.flr.merge import interpolate, signal_share
 from jflnr.flr.pyramid import double, halve
 
@@ -48,7 +48,8 @@ def fit_levels(
         last = grids[-1]
         grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
     features = guide_features(grids[-1], shift.size, numbers)
-    coarsest = coarse = fit_level(grids[-1], features, shift, channels, mean, numbers)
+    system = windowed(grids[-1], features, shift, channels, mean, numbers)
+    coarsest = coarse = fit_level(system, shift.size, channels)
     merged, steps = coarse.coefficients, list[Step]()
     for grid in reversed(grids[:-1]):
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
@@ -77,7 +78,8 @@ def _refine(
     # Windows end where what is known so far of the brightness changes.
     edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
     features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
-    fine = fit_level(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    fine = fit_level(system, shift.size, channels)
     reference = level**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     merged = merged + share * (fine.coefficients - coarse.coefficients)

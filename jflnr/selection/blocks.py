@@ -211,7 +211,8 @@ def _weighted(
     coarse = Grid(halve(light), jnp.zeros_like(halve(light[:1])), 2 * BLOCK)
     wide = numbers._replace(sigma=2.0)
     features = guide_features(coarse, count, numbers)
-    pilot = fit_level(coarse, features, collected.shift, 1, mean, wide).coefficients
+    system = windowed(coarse, features, collected.shift, 1, mean, wide)
+    pilot = fit_level(system, collected.shift.size, 1).coefficients
     pilot = double(pilot, *light.shape[1:])
     level = predict(pilot, mean_guides(light, count))
     squares = squared_residual(light, collected.squares, pilot[:, 0])

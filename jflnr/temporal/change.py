@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jflnr.flr.adaptive import light_of
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.apply import apply
-from jflnr.flr.level import Grid, fit_level, mean_guides, predict
+from jflnr.flr.level import Grid, fit_level, mean_guides, predict, windowed
 from jflnr.flr.moments import Guides, centre
 from jflnr.flr.weighted_moments import collect_weighted
 from jflnr.flr.widths import guide_features
@@ -72,7 +72,8 @@ def find_change(
     squares = jnp.where(weight > 0, weight * light, 0) ** 2
     grid = Grid(*collect_weighted(difference, guides, shift, weight, squares, BLOCK), BLOCK)
     features = guide_features(grid, shift.size, numbers)
-    fit = fit_level(grid, features, shift, channels, jnp.ones(()), numbers)
+    system = windowed(grid, features, shift, channels, jnp.ones(()), numbers)
+    fit = fit_level(system, shift.size, channels)
     found = predict(fit.coefficients, mean_guides(grid.moments, shift.size)) ** 2
     there = grid.moments[0] > 1e-12
     now = gather(jnp.where(there, jnp.stack([found, fit.variance]), 0), fit.window)
