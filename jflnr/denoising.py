@@ -83,18 +83,18 @@ def denoise(
 
         return select_inputs(inputs, names, keep_energy=keep_energy)[1]
     if method in flnr.METHODS:
-        if backend != "jax" or block != BLOCK:
-            raise ValueError(f"method {method} runs on the jax backend, with block {BLOCK}")
+        if block != BLOCK:
+            raise ValueError(f"method {method} works with block {BLOCK} only; got {block}")
         from jflnr.flnr.method import denoise_flnr
         from jflnr.flnr.weights import shipped
 
         settings = _parameters(parameters, {}) if parameters is not None else shipped(method)
         if tile is None:
-            return denoise_flnr(inputs, method, settings, names=names, keep_energy=keep_energy)
+            return denoise_flnr(
+                inputs, method, settings, names=names, keep_energy=keep_energy, backend=backend
+            )
     elif method == "flr-adaptive":
         settings = _parameters(parameters, ADAPTIVE_DEFAULT)
-        if backend != "jax" and tile is not None:
-            raise ValueError("method flr-adaptive works in tiles on the jax backend only")
         if inputs.indirect.shape[:2] != inputs.normal.shape[:2]:
             raise ValueError("method flr-adaptive needs frame.indirect at the size of the guides")
         if tile is None:
@@ -104,6 +104,8 @@ def denoise(
         settings = _parameters(parameters, DEFAULT)
         if tile is None:
             return denoise_flr(inputs, settings, names, block, backend)
+    if backend != "jax" and method != "flr":
+        raise ValueError(f"method {method} works in tiles on the jax backend only")
     from jflnr.large import strips
 
     checks.positive_integer("tile", tile)

@@ -23,15 +23,22 @@ def denoise_flnr(
     *,
     names: Sequence[str] = features.GUIDES,
     keep_energy: bool = False,
+    backend: str = "jax",
 ) -> Array:
     """Denoise with the network of a method, or with weights of one's own.
 
     frame: as from `read_frame`, with `ao`. params: as from `weights.load`; those that come with the
     package if None. names: the guides asked for. keep_energy: keep the mean radiance exactly.
+    backend: `jax` or `opencl`.
     Returns `(H, W, 3)`. Raises as `check` does.
     """
     check(method, names, frame.indirect.shape, frame.normal.shape)
     params = weights.shipped(method) if params is None else params
+    if backend == "opencl":
+        from jflnr import opencl
+
+        images = adaptive_images(frame, features.GUIDES, smooth=opencl.smooth_guide)
+        return opencl.flnr(params=params, keep_energy=keep_energy, **images)
     return _finished(params, *prepared(frame), frame, keep_energy)
 
 
