@@ -3,6 +3,7 @@
 render SCENE -o FILE.exr     one view of `room`, `FAMILY-SEED`, a shared scene, or an XML file
 render SCENE -o FOLDER --views N        its camera where it has one, else N random views
 render SCENE -o FOLDER --motion MOTION --frames N      a sequence
+render again FRAME.exr -o FILE.exr       a finished frame once more, as its header says
 render families [-o docs/scenes.png]    one scene of each family on a contact sheet
 render data [--split train|val|test] [--frames N]       the data set; resumes
 render shots [--folder cache/sequences]         those of the experiment `sequences`; resumes
@@ -19,7 +20,7 @@ from pathlib import Path
 
 from experiments.render import backend
 
-VERBS = ("families", "data", "shots", "statistics", "efficiency")
+VERBS = ("again", "families", "data", "shots", "statistics", "efficiency")
 MOTIONS = ("static", "camera", "light", "switch", "object")
 
 
@@ -49,6 +50,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
     parser.add_argument("--threads", type=int, help="CPU threads; all by default")
     {
         "one": _one,
+        "again": _again,
         "families": _families,
         "data": _data,
         "shots": _shots,
@@ -69,7 +71,7 @@ def _one(parser: argparse.ArgumentParser) -> None:
 def _shots(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--folder", type=Path, default=Path("cache/sequences"))
     _rendering(parser)
-    parser.set_defaults(width=320, height=180, direct_spp=64, minutes=3)
+    parser.set_defaults(width=320, height=180, direct_spp=64, minutes=6)
 
 
 def _rendering(parser: argparse.ArgumentParser) -> None:
@@ -85,14 +87,21 @@ def _rendering(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ao-distance", type=float, help="in scene units")
     parser.add_argument("--direct-spp", type=int, default=256)
     parser.add_argument("--reference-spp", type=int, help="exactly so many, whatever the error")
-    parser.add_argument("--minutes", type=float, default=20, help="at most, for a reference")
+    parser.add_argument("--minutes", type=float, default=40, help="of a processor, for a reference")
     parser.add_argument("--leave-out", nargs="*", default=[], metavar="LAYER")
     parser.add_argument("--frames", type=int, default=20, help="of a sequence")
 
 
+def _again(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("frame", type=Path, help="a frame rendered here or of `shared/data`")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="EXR file")
+    parser.add_argument("--error", type=float, help="of the reference; by default as many samples")
+    parser.add_argument("--minutes", type=float, default=40, help="of a processor, with --error")
+
+
 def _families(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/scenes.png"))
-    parser.add_argument("--seed", type=int, default=1, help="of the scenes")
+    parser.add_argument("--seed", type=int, default=2001, help="of the scenes")
     parser.add_argument("--spp", type=int, default=256)
 
 

@@ -72,16 +72,16 @@ def render(
     mask = layers["mask"] > 0
     layers["direct"] = mask * tracer.direct(settings.direct_spp, seed("direct"))
     layers["direct"] /= settings.direct_spp
-    layers |= noisy(tracer, settings)
     reference = Accumulator.of(tracer, settings, seed("reference"), mask[..., 0], state)
     reference.run(settings.goal, report)
     layers["reference"], layers["reference_a"] = reference.mean(), reference.first_half()
+    layers |= noisy(tracer, settings)
     facts = {
         "reference_spp": reference.spp,
-        "reference_seconds": round(reference.seconds, 1),
+        "reference_processor_seconds": round(reference.seconds, 1),
         "reference_median_relative_standard_error": round(reference.relative_error(), 5),
         "reference_sampling": "guided next-event estimation" + (" + MIS" if reference.mis else ""),
-        "reference_samples_per_second": round(reference.samples_per_second()),
+        "reference_samples_per_processor_second": round(reference.samples_per_second()),
     }
     return layers, header(camera, settings, ao_distance) | facts
 

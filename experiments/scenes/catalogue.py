@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from experiments.scenes import colonnade, forms, nature, passages, rooms
+from experiments.scenes import colonnade, forms, nature, night, palette, passages, rooms
 from experiments.scenes.room import room
 from experiments.scenes.world import World
 
@@ -20,12 +20,17 @@ FAMILIES: dict[str, Callable[[int], World]] = {
     "terrain": nature.terrain,
     "cave": nature.cave,
     "hall": passages.hall,
-    "lamps": rooms.lamps,
+    "lamps": night.lamps,
+    "lanterns": night.lanterns,
 }
+
+CALM = 2000  # the first seed of calm colours
 
 
 def world_of(name: str) -> World:
     """The scene `room`, or `FAMILY-SEED`, such as `stairs-3`.
+
+    Scenes from seed 2000 on have the colours of paint and cloth, those before of plastic.
 
     Raises ValueError for an unknown name.
     """
@@ -35,4 +40,5 @@ def world_of(name: str) -> World:
     if family not in FAMILIES or not seed.isdigit():
         known = ", ".join(f"{f}-SEED" for f in FAMILIES)
         raise ValueError(f"there is no scene {name!r} of ours: use room, {known}")
-    return FAMILIES[family](int(seed))
+    world = FAMILIES[family](int(seed))
+    return world if int(seed) < CALM else palette.calm(world, int(seed))

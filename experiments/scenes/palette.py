@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from colorsys import hsv_to_rgb
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.scenes import textures
-from experiments.scenes.world import Material, plain
+from experiments.scenes.world import Material, World, plain
 
 Array = NDArray[np.float64]
 
@@ -104,3 +105,16 @@ def lamplight(rng: np.random.Generator) -> Array:
         warmth = rng.uniform(-0.5, 1.0)
         colour = np.array([1 + 0.35 * warmth, 1.0, 1 - 0.5 * warmth])
     return colour / colour.mean()
+
+
+def calm(world: World, seed: int) -> World:
+    """The world with weaker colours; one surface in seven keeps its own."""
+    rng = np.random.default_rng([40, seed])
+    share = rng.uniform(0.2, 0.6)
+
+    def faded(material: Material) -> Material:
+        grey = material.texture.mean(-1, keepdims=True)
+        kept = 1.0 if rng.random() < 1 / 7 else share
+        return replace(material, texture=np.float32(grey + kept * (material.texture - grey)))
+
+    return replace(world, surfaces=[replace(s, material=faded(s.material)) for s in world.surfaces])

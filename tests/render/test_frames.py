@@ -17,7 +17,7 @@ from experiments.render.reference import Accumulator, Goal
 from experiments.render.sequence import BALL, MOVER, Shot
 from experiments.render.splits import TEST, VAL
 from experiments.render.tracer import Tracer
-from jflnr.exr import read_attributes, read_channels
+from jflnr.exr import read_attributes, read_channels, write_channels
 
 SMALL = ["--width", "48", "--height", "27", "--reference-spp", "64", "--direct-spp", "8"]
 
@@ -40,6 +40,33 @@ def test_a_frame_on_disk(tmp_path: Path) -> None:
     assert command.main(arguments) == 0
     assert path.stat().st_mtime_ns == before
     assert [p.name for p in tmp_path.iterdir()] == ["room.exr"]
+
+
+def test_a_frame_again_from_its_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, second, other = (tmp_path / name for name in ("a.exr", "b.exr", "c.exr"))
+    arguments = ["forms-1", "-o", str(first), *SMALL, "--spp", "1", "2", "--realisations", "2"]
+    assert command.main([*arguments, "--view", "101", "--seed", "7", "--nee-only"]) == 0
+    assert command.main(["again", str(first), "-o", str(second)]) == 0
+    a, b = (read_channels(path) for path in (first, second))
+    assert a.keys() == b.keys()
+    repeatable = [n for n in a if not n.startswith("reference")]
+    off = [np.mean(~np.isclose(a[n], b[n], rtol=2e-3, atol=1e-3)) for n in repeatable]
+    assert max(off) < 0.01
+    reference, again = (
+        np.mean([c[f"reference.{x}"].astype(float) for x in "RGB"], axis=0) for c in (a, b)
+    )
+    assert again.mean() == pytest.approx(reference.mean(), rel=0.03)
+    one, two = (json.loads(read_attributes(p).comments) for p in (first, second))
+    varying = {"reference_processor_seconds", "reference_samples_per_processor_second"}
+    varying |= {"reference_sampling", "reference_median_relative_standard_error"}
+    assert {k: v for k, v in one.items() if k not in varying} == {
+        k: v for k, v in two.items() if k not in varying
+    }
+    channels = read_channels(first)
+    channels["depth.Z"] = channels["depth.Z"] * 1.1
+    write_channels(other, channels, read_attributes(first).comments)
+    assert command.main(["again", str(other), "-o", str(tmp_path / "d.exr")]) == 2
+    assert "its scene forms-1 has changed" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,11 @@ def run(arguments: argparse.Namespace) -> None:
             layers, facts = frame.render(source.scene, view[0], settings, view[1])
             pictures.append((name, tone_mapped(layers)))
             error = facts["reference_median_relative_standard_error"]
-            speed = facts["reference_samples_per_second"] / 1e6
-            print(f"{name}: error {error:.3f}, {speed:.2f} million samples/s", flush=True)
+            speed = facts["reference_samples_per_processor_second"] / 1e6
+            print(
+                f"{name}: error {error:.3f}, {speed:.2f} million samples/core-s",
+                flush=True,
+            )
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     contact_sheet(pictures).save(arguments.output)
     print(f"wrote {arguments.output}")

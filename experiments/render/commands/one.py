@@ -124,6 +124,6 @@ def _write(
 
 def _say(path: Path, facts: dict[str, Any]) -> None:
     error = facts["reference_median_relative_standard_error"]
-    speed = facts["reference_samples_per_second"] / 1e6
+    speed = facts["reference_samples_per_processor_second"] / 1e6
     spp = facts["reference_spp"]
-    print(f"{path}: reference {spp} spp, error {error:.3f}, {speed:.2f} million samples/s")
+    print(f"{path}: reference {spp} spp, error {error:.3f}, {speed:.2f} million samples/core-s")
