@@ -63,8 +63,8 @@ class History(NamedTuple):
 
 def start(frame: Frame) -> History:
     """The history before the first frame: nothing in it can be taken over."""
-    light = jnp.zeros(frame.normal.shape, jnp.float32)
     surface = jax.tree.map(lambda layer: jnp.zeros(layer.shape, layer.dtype), Surface.of(frame))
+    light = jnp.zeros(frame.normal.shape, jnp.float32)
     return History(jnp.int32(0), surface, light[..., :1], light, light, light)
 
 

@@ -58,7 +58,7 @@ def camera_motion(depth: Array, camera: Camera, before: Camera) -> jax.Array:
     here = _plane_points(height, width, camera.fov_x)
     rays = jnp.concatenate([here, jnp.ones_like(here[..., :1])], axis=-1)
     # Straight from one camera to the other: of large world coordinates float32 keeps too little.
-    now, then = (jnp.asarray(c.to_world, jnp.float32) for c in (camera, before))
+    now, then = (jnp.asarray(c.to_world) for c in (camera, before))
     points = rays * jnp.where(depth > 0, depth, SKY) @ now[:3, :3].T + (now - then)[:3, 3]
     points = points @ then[:3, :3]
     ahead = points[..., 2:]

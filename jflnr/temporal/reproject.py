@@ -12,6 +12,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jflnr import checks
 from jflnr.frame import Array, Frame
 
 # A tap may be off the pixel's tangent plane by this share of the depth. Positions that are stored
@@ -35,7 +36,11 @@ class Surface(NamedTuple):
 
     @classmethod
     def of(cls, frame: Frame) -> Surface:
-        """Those that a frame shows."""
+        """Those that a frame shows. Raises `ValueError` if it lacks a normal or a depth."""
+        checks.image("normal", frame.normal, 3)
+        checks.image("depth", frame.depth, 1)
+        if frame.position is not None:
+            checks.image("position", frame.position, 3)
         return cls(frame.normal, frame.depth, frame.position)
 
 
