@@ -28,10 +28,9 @@ REALISATIONS = 4
 ERROR = {"train": 0.06, "val": 0.02, "test": 0.02}
 SECONDS_PER_PIXEL = 75 / (320 * 184)  # of a processor at most, for a reference
 TWENTY_MINUTES = 2400.0  # of two cores
-VIEWS = 2
 STRONG = 4  # rounds with strong colours; then come calm ones
 # Views of which `shared/data` has noisier references.
-STORED = {"bathroom": (0, 4), "living-room": (0, 1), "living-room-2": (0, 3), "staircase": (0, 1)}
+STORED = {"bathroom": (0, 4), "staircase": (0, 1), "living-room-2": (0, 3), "living-room": (0, 1)}
 # One sequence of every scene of val and test, and what moves in it.
 MOTIONS = {
     "veach-lamp": "object",
@@ -79,18 +78,16 @@ def training_jobs() -> Iterator[Job]:
 
 
 def _round(number: int) -> Iterator[Job]:
-    """One scene of every family, a second sunlit one and one training room, few views each.
+    """A view of one scene of every family, of a second sunlit one and of one training room.
 
     Most real rooms are sunlit, and little light is found in them. Most frames are 320 x 184;
-    every sixth round has one of 640 x 360 in each scene, every twelfth one of 1280 x 720 in some.
+    those of every sixth round are 640 x 360, of every twelfth a quarter 1280 x 720.
     """
     room = TRAIN_ROOMS[number % len(TRAIN_ROOMS)]
     seed = number + (1 if number < STRONG else CALM)
-    names = [*(f"{family}-{seed}" for family in FAMILIES), f"sunlit-{seed + 999}", room]
-    for index, name in enumerate(names):
-        first = RANDOM + VIEWS * (number // len(TRAIN_ROOMS)) if name == room else RANDOM
-        for view in range(first, first + VIEWS):
-            yield Job(name, view, *_size(number, index, view - first))
+    for index, name in enumerate([*(f"{f}-{seed}" for f in FAMILIES), f"sunlit-{seed + 999}"]):
+        yield Job(name, RANDOM, *_size(number, index))
+    yield Job(room, RANDOM + number // len(TRAIN_ROOMS), *_size(number, len(FAMILIES) + 1))
 
 
 def evaluation_jobs(split: str) -> Iterator[Job]:
@@ -102,10 +99,10 @@ def evaluation_jobs(split: str) -> Iterator[Job]:
         yield Job(scene, 0, 640, 360, split, MOTIONS[scene], number)
 
 
-def _size(number: int, index: int, view: int) -> tuple[int, int]:
-    if view == 0 and number % 12 == 11 and index % 4 == number // 12 % 4:
+def _size(number: int, index: int) -> tuple[int, int]:
+    if number % 12 == 11 and index % 4 == number // 12 % 4:
         return 1280, 720
-    return (640, 360) if view == 0 and number % 6 == 5 else (320, 184)
+    return (640, 360) if number % 6 == 5 else (320, 184)
 
 
 def settings_of(job: Job) -> frame.Settings:

@@ -30,6 +30,16 @@ class Manifest:
         """Finished frames of a split."""
         return sum(entry.get("split") == split for entry in self.entries.values())
 
+    def summary(self, split: str, error: float) -> str:
+        """How many frames and scenes of a split there are, and how many are as good as asked."""
+        frames = [entry for entry in self.entries.values() if entry.get("split") == split]
+        scenes = {entry["scene"] for entry in frames}
+        good = sum(e["reference_median_relative_standard_error"] <= error for e in frames)
+        return (
+            f"{len(frames)} frames of {len(scenes)} scenes of the split {split}; the references "
+            f"of {good} have an error of at most {error:.0%}"
+        )
+
     def add(self, name: str, facts: dict[str, Any]) -> None:
         """Record a finished frame, with the SHA-256 of its file."""
         digest = hashlib.sha256((self.path.parent / name).read_bytes()).hexdigest()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from jflnr.exr import read_attributes, read_channels
+from jflnr.exr import layers_of, read_attributes, read_channels
 
 MEASURES = {
     "lit": "share of lit pixels",
@@ -39,8 +39,8 @@ def measure(noisy: NDArray[np.floating], reference: NDArray[np.floating]) -> dic
     }
 
 
-def measure_file(path: Path) -> tuple[str, dict[str, float]]:
-    """The scene of a frame and its statistics."""
+def measure_file(path: Path) -> tuple[str, list[dict[str, float]]]:
+    """The scene of a frame and the statistics of each of its 1-spp layers."""
     channels = read_channels(path)
     scene = json.loads(read_attributes(path).comments)["scene"]
     mask = channels["mask.Y"].astype(float) > 0
@@ -48,7 +48,9 @@ def measure_file(path: Path) -> tuple[str, dict[str, float]]:
     def luminance(layer: str) -> NDArray[np.floating]:
         return np.mean([channels[f"{layer}.{c}"].astype(float)[mask] for c in "RGB"], axis=0)
 
-    return scene, measure(luminance("indirect_1"), luminance("reference"))
+    names = [n for n in layers_of(channels) if n == "indirect_1" or n.startswith("indirect_1_")]
+    reference = luminance("reference")
+    return scene, [measure(luminance(name), reference) for name in names]
 
 
 def covered(ours: Sequence[float], theirs: Sequence[float]) -> float:

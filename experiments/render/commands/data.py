@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 
 from experiments.render import workers
-from experiments.render.dataset import evaluation_jobs, fill, training_jobs
+from experiments.render.dataset import ERROR, evaluation_jobs, fill, training_jobs
+from experiments.render.manifest import Manifest
 
 TRAINING = 400  # frames, unless the arguments say how many
 
@@ -20,8 +21,8 @@ def run(arguments: argparse.Namespace) -> None:
         jobs, frames = iter(every), arguments.frames or len(every)
     say = lambda line: print(line, flush=True)
     if arguments.cluster is None:
-        there = fill(arguments.folder, jobs, frames, say)
+        fill(arguments.folder, jobs, frames, say)
     else:
         threads = arguments.threads
-        there = workers.fill(arguments.cluster, arguments.folder, jobs, frames, threads, say)
-    print(f"{there} frames of the split {split} in {arguments.folder}")
+        workers.fill(arguments.cluster, arguments.folder, jobs, frames, threads, say)
+    print(Manifest(arguments.folder).summary(split, ERROR[split]))

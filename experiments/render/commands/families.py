@@ -14,8 +14,8 @@ from experiments.scenes.catalogue import FAMILIES
 
 def run(arguments: argparse.Namespace) -> None:
     """Render the scene `--seed` of every family and write the sheet."""
-    bounds = Goal(0.0, arguments.spp, arguments.spp)
-    settings = frame.Settings(320, 180, direct_spp=64, goal=bounds)
+    goal = Goal(arguments.error, seconds=arguments.seconds)
+    settings = frame.Settings(320, 180, direct_spp=64, goal=goal)
     pictures = []
     with Progress("families") as progress:
         for number, family in enumerate(FAMILIES):

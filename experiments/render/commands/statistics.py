@@ -41,7 +41,7 @@ def _measure(paths: list[Path]) -> Found:
     for path in paths:
         scene, values = measure_file(path)
         family = scene.rpartition("-")[0]
-        found.setdefault(family if family in FAMILIES else scene, []).append(values)
+        found.setdefault(family if family in FAMILIES else scene, []).extend(values)
     return found
 
 
@@ -50,10 +50,10 @@ def _values(found: Found, key: str) -> list[float]:
 
 
 def _print(found: Found) -> None:
-    print(f"{'scene':16}{'frames':>7}" + "".join(f"{key:>12}" for key in MEASURES))
-    for name, frames in found.items():
-        medians = [np.median([frame[key] for frame in frames]) for key in MEASURES]
-        print(f"{name:16}{len(frames):7}" + "".join(f"{m:12.3g}" for m in medians))
+    print(f"{'scene':16}{'layers':>7}" + "".join(f"{key:>12}" for key in MEASURES))
+    for name, layers in found.items():
+        medians = [np.median([layer[key] for layer in layers]) for key in MEASURES]
+        print(f"{name:16}{len(layers):7}" + "".join(f"{m:12.3g}" for m in medians))
 
 
 def _draw(ours: Found, real: Found, path: Path) -> None:
@@ -63,7 +63,9 @@ def _draw(ours: Found, real: Found, path: Path) -> None:
         for row, name in enumerate(names):
             frames = (real | ours)[name]
             colour = "tab:blue" if name in FAMILIES else "tab:orange"
-            axis.plot([f[key] for f in frames], [row] * len(frames), "o", color=colour, alpha=0.6)
+            axis.plot(
+                [f[key] for f in frames], [row] * len(frames), "o", color=colour, alpha=0.6, ms=4
+            )
         low, high = min(_values(ours, key)), max(_values(ours, key))
         axis.axvspan(low, high, color="tab:blue", alpha=0.08)
         axis.set_title(title, fontsize=10)
