@@ -107,6 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError("--error-map needs --method flr-adaptive on the jax backend")
     jobs = plan(arguments.inputs, arguments.output)
     bound = memory.parse(arguments.memory) if arguments.memory else None
+    if len(jobs) > 1 and bound is None:
+        memory.keep_freed()
     denoiser = Denoiser(settings_of(arguments), arguments, bound, min(len(jobs), 3))
     records, start = [], time.perf_counter()
     with (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import re
 
 import psutil
@@ -18,6 +20,8 @@ PIECE = {"flr": 230, "flr-adaptive": 160}
 STRIP_OVERLAP, TILE_OVERLAP, NETWORK_OVERLAP = 200, 1664, 2048
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
+# The name that glibc's <malloc.h> gives what `keep_freed` sets, and bytes that are kept.
+TRIM_THRESHOLD, KEPT = -1, 2**29
 
 
 def parse(text: str) -> int:
@@ -31,6 +35,16 @@ def parse(text: str) -> int:
 def free() -> int:
     """The memory that a frame may take if nobody says: a share of what is free."""
     return int(SHARE * psutil.virtual_memory().available)
+
+
+def keep_freed() -> None:
+    """Keep up to `KEPT` bytes that are freed for whatever is next, where the C library is glibc.
+
+    It would hand the memory of a frame back to the system, and clearing new pages for the next one
+    takes a fifth of the processor time of a folder.
+    """
+    with contextlib.suppress(OSError):
+        ctypes.CDLL("libc.so.6").mallopt(TRIM_THRESHOLD, KEPT)
 
 
 def tile_for(

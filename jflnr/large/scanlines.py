@@ -117,7 +117,7 @@ def writing(
         spec.full_x, spec.full_y = left, top
         spec.full_width, spec.full_height = right - left + 1, bottom - top + 1
     # As `exr.write_channels` does.
-    spec.attribute("compression", "rle" if kind == "float" else "zip")
+    spec.attribute("compression", "none" if kind == "float" else "zip")
     spec.attribute("comments", comments)
     row, stored = spec.y, np.float32 if kind == "float" else np.float16
     with replacing(path) as beside:

@@ -61,9 +61,11 @@ def denoise(rows: Rows, options: Options, tile: int, folder: Path | None = None)
 
         height = max(tile * tile // rows.width, 1)
         return local.strips(rows, one, height=height, block=block, support=support)
-    if method not in ("flr-adaptive", *flnr.METHODS) or backend != "jax":
+    methods = ("flr-adaptive", *flnr.METHODS)
+    if method not in methods or backend != "jax":
+        advice = ", or take --backend jax" if method in methods else ""
         raise ValueError(
-            f"method {method} on {backend} needs the whole frame in memory: raise --memory"
+            f"method {method} on {backend} needs the whole frame in memory: raise --memory{advice}"
         )
     pieces = functools.partial(
         pyramid.strips, rows, block=block, tile=tile, keep_energy=keep_energy, folder=folder

@@ -59,7 +59,7 @@ def test_a_file_that_cannot_be_denoised_says_why(
     exr.write_channels(tmp_path / "a.exr", dict.fromkeys("RGB", np.ones((4, 5), "f")), "", window)
     assert main(["info", str(tmp_path / "a.exr")]) == 0
     text = capsys.readouterr().out
-    assert "5 x 4 pixels from (3, 4), RLE compression, 1 part" in text
+    assert "5 x 4 pixels from (3, 4), NO compression, 1 part" in text
     assert "layer indirect_1 is missing; the file holds plain RGB; layers that go by" in text
 
 
