@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jflnr.flr.moments import magnitude
 from jflnr.frame import Array
 
 # Displacements of the grid, in blocks: a sequence of 16 (section 6.1), here spread evenly.
@@ -59,7 +60,9 @@ def fit(
         len(rows) * len(columns), block * block, -1
     )
     surface = surface & jnp.all(jnp.isfinite(features), axis=-1, keepdims=True)
-    there, z = cut(surface), cut(light)
+    # Sums over a block of light near the type's maximum must not overflow.
+    unit = jnp.maximum(magnitude(light), 1)
+    there, z = cut(surface), cut(light / unit)
     t = scaled_features(cut(features), there, squares)
     used = there & jnp.all(jnp.isfinite(z), axis=-1, keepdims=True)
     matrix = jnp.concatenate([jnp.where(used, t, 0), jnp.where(used, z, 0)], axis=-1)
@@ -69,7 +72,7 @@ def fit(
     alpha = jax.scipy.linalg.solve_triangular(r[..., :count], r[..., count:])
     fitted = (t @ alpha).reshape(len(rows), len(columns), block, block, channels)
     image = fitted.swapaxes(1, 2).reshape(len(rows) * block, len(columns) * block, channels)
-    return jax.lax.dynamic_slice(image, (*offset, 0), light.shape)
+    return jax.lax.dynamic_slice(image, (*offset, 0), light.shape) * unit
 
 
 def mirrored(size: int, block: int, offset: Any) -> jax.Array:
