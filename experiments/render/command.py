@@ -102,8 +102,7 @@ def _again(parser: argparse.ArgumentParser) -> None:
 def _families(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/scenes.png"))
     parser.add_argument("--seed", type=int, default=2001, help="of the scenes")
-    parser.add_argument("--error", type=float, default=0.05, help="goal of each picture")
-    parser.add_argument("--seconds", type=float, default=40, help="of a processor, at most, each")
+    parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
 
 
 def _data(parser: argparse.ArgumentParser) -> None:

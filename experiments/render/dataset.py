@@ -126,10 +126,12 @@ def settings_of(job: Job) -> frame.Settings:
 def fill(
     folder: Path,
     jobs: Iterator[Job],
-    frames: int,
+    frames: int | None,
     say: Callable[[str], None] = print,
 ) -> int:
-    """Render jobs until `frames` of their split are there; returns how many. Finished ones stay.
+    """Render jobs until `frames` of their split are there, or all; returns how many there are.
+
+    Finished ones stay.
 
     Raises ValueError where a job's scene does not belong to the split it is to be written to.
     """
@@ -137,7 +139,7 @@ def fill(
     start, made, there = time.monotonic(), 0, 0
     for job in jobs:
         there = manifest.count(job.split)
-        if there >= frames:
+        if frames is not None and there >= frames:
             break
         check_split(job.scene, job.split)
         if manifest.done(job.name):
@@ -149,9 +151,12 @@ def fill(
             continue
         manifest.add(job.name, found)
         there, made = there + 1, made + 1
-        left = (frames - there) * (time.monotonic() - start) / made / 60
         error = manifest.entries[job.name]["reference_median_relative_standard_error"]
-        say(f"{job.name}: error {error:.3f}; {there} of {frames} frames, {left:.0f} minutes left")
+        line = f"{job.name}: error {error:.3f}"
+        if frames is not None:
+            left = (frames - there) * (time.monotonic() - start) / made / 60
+            line += f"; {there} of {frames} frames, {left:.0f} minutes left"
+        say(line)
     return there
 
 

@@ -98,13 +98,18 @@ def noisy(tracer: Tracer, settings: Settings) -> Layers:
 
 def renoised(path: Path, tracer: Tracer, settings: Settings) -> tuple[Layers, dict[str, Any]]:
     """The finished frame `path` with other noise."""
+    layers, facts = read(path)
+    return layers | noisy(tracer, settings), facts | {"seed": settings.seed}
+
+
+def read(path: Path) -> tuple[Layers, dict[str, Any]]:
+    """The layers of a finished frame, and the facts of its header."""
     channels = read_channels(path)
     layers = {
         name: np.stack([channels[f"{name}.{axis}"] for axis in axes], -1)
         for name, axes in layers_of(channels).items()
     }
-    facts = json.loads(read_attributes(path).comments)
-    return layers | noisy(tracer, settings), facts | {"seed": settings.seed}
+    return layers, json.loads(read_attributes(path).comments)
 
 
 def header(camera: Camera, settings: Settings, ao_distance: float) -> dict[str, Any]:

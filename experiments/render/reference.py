@@ -47,7 +47,7 @@ class Goal:
 
 def clock() -> float:
     """Processor seconds, which do not pass while other programs run; on a GPU real ones."""
-    return time.monotonic() if mi.variant().startswith("cuda") else time.process_time()
+    return time.monotonic() if str(mi.variant()).startswith("cuda") else time.process_time()
 
 
 @dataclass

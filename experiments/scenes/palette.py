@@ -115,6 +115,6 @@ def calm(world: World, seed: int) -> World:
     def faded(material: Material) -> Material:
         grey = material.texture.mean(-1, keepdims=True)
         kept = 1.0 if rng.random() < 1 / 7 else share
-        return replace(material, texture=np.float32(grey + kept * (material.texture - grey)))
+        return replace(material, texture=(grey + kept * (material.texture - grey)).astype("f4"))
 
     return replace(world, surfaces=[replace(s, material=faded(s.material)) for s in world.surfaces])
