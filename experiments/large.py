@@ -1,16 +1,11 @@
-"""Frames larger than memory, folders of frames, and workers: what each costs."""
+"""Frames larger than memory: what they take whole and in pieces, and whether a seam shows."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import os
-import signal
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,26 +14,21 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import jflnr
-from experiments import data, mosaic, plots, results
-from jflnr.cli import parser
-from jflnr.cli.frames import Denoiser, failure
-from jflnr.cli.jobs import Job, plan
-from jflnr.cli.pipeline import pipelined
-from jflnr.cli.settings import settings_of
-from jflnr.cluster import each, local_cluster
+from experiments import crop, data, mosaic, plots, results, resume
 from jflnr.files import replacing
+from jflnr.large import memory
 from jflnr.metrics import display, exposure
 
 NAME = "large"
-QUESTION = "What do large frames, many frames and several workers take, in memory and in time?"
+QUESTION = "What do large frames take, in memory and in time, whole and in pieces?"
 
-METHODS = ("flr", "flr-adaptive")
-BACKENDS = ("jax", "opencl")
+METHODS = ("flr", "flr-adaptive", "flnr")
 # Pixels of the frames whose memory is measured, and what they may take in pieces.
 SIZES = ((1080, 1920), (2160, 3840), (4320, 7680))
 MEMORY = "1500M"
-WORKERS = (1, 2)
-FRAMES = 60
+# A frame that does not fit, and the methods of which a crop can be denoised by itself.
+LARGEST, LARGEST_MEMORY = (8192, 16384), "4G"
+CROPPED = ("flr", "flr-adaptive")
 # Runs one command line and says what it took: peak memory is a process's own.
 MEASURED = """
 import json, resource, sys, time
@@ -52,33 +42,61 @@ print(json.dumps({"code": code, "MB": peak / 1024, "seconds": time.perf_counter(
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """Memory and time by size; frames per second of a folder by what runs it."""
+    """Memory and time by size and method, and crops of the largest frame."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        sizes = SIZES[:1] if quick else SIZES
-        memory = [row for size in sizes for row in _sizes(folder, *size)]
-        shot = folder / "shot"
-        _shot(shot, 4 if quick else FRAMES, *((180, 320) if quick else (720, 1280)))
-        return {
-            "memory": memory,
-            "pipeline": [row for backend in BACKENDS for row in _pipeline(shot, backend)],
-            "workers": _workers(shot),
-            "killed": _killed(shot),
-        }
+        if quick:
+            return {"memory": _sizes(folder, "flr", *SIZES[0]), "largest": []}
+        keys = [f"{method} {h} {w}" for h, w in SIZES for method in METHODS]
+        sizes = resume.rows(NAME, keys, lambda key: _sizes(folder, *_parsed(key)))
+        largest = resume.rows(f"{NAME}-largest", CROPPED, lambda method: _largest(folder, method))
+    return {"memory": [row for rows in sizes for row in rows], "largest": largest}
 
 
-def _sizes(folder: Path, height: int, width: int) -> list[dict[str, Any]]:
-    """A frame of one size by every method, whole and in pieces."""
-    source = folder / "frame.exr"
-    mosaic.write(source, height, width)
+def _parsed(key: str) -> tuple[str, int, int]:
+    method, height, width = key.split()
+    return method, int(height), int(width)
+
+
+def _sizes(folder: Path, method: str, height: int, width: int) -> list[dict[str, Any]]:
+    """A frame of one size, whole and in pieces."""
+    source = _mosaic(folder, height, width)
     rows = []
-    for method in METHODS:
-        for way, memory in (("whole", "100G"), ("in pieces", MEMORY)):
-            options = ["--method", method, "--memory", memory, "--overwrite", "--json"]
-            found = measured(["denoise", str(source), "-o", str(folder / "out.exr"), *options])
-            megapixels = height * width / 1e6
-            rows.append({"method": method, "way": way, "megapixels": megapixels, **found})
+    for way, bound in (("whole", "100G"), ("in pieces", MEMORY)):
+        found = _denoised(source, folder / "out.exr", method, bound)
+        rows.append({"method": method, "way": way, "megapixels": height * width / 1e6, **found})
     return rows
+
+
+def _largest(folder: Path, method: str) -> dict[str, Any]:
+    """The largest frame in pieces, and a crop of it around a place where these meet."""
+    source, output = _mosaic(folder, *LARGEST), folder / "out.exr"
+    found = _denoised(source, output, method, LARGEST_MEMORY)
+    tile = memory.tile_for(*LARGEST, memory.parse(LARGEST_MEMORY), method=method)
+    assert tile is not None
+    found |= crop.difference(source, output, method, seam(method, tile))
+    return {"method": method, "megapixels": LARGEST[0] * LARGEST[1] / 1e6, **found}
+
+
+def seam(method: str, tile: int) -> tuple[int, int]:
+    """Row and column, near the middle of the largest frame, where pieces meet."""
+    height, width = LARGEST
+    if method == "flr":
+        strip = -(-(tile * tile // width) // crop.BLOCK) * crop.BLOCK
+        return height // 2 // strip * strip, width // 2
+    return height // 2 // tile * tile, width // 2 // tile * tile
+
+
+def _mosaic(folder: Path, height: int, width: int) -> Path:
+    path = folder / f"{height}x{width}.exr"
+    if not path.exists():
+        mosaic.write(path, height, width)
+    return path
+
+
+def _denoised(source: Path, output: Path, method: str, bound: str) -> dict[str, Any]:
+    options = ["--method", method, "--memory", bound, "--overwrite", "--json"]
+    return measured(["denoise", str(source), "-o", str(output), *options])
 
 
 def measured(arguments: list[str]) -> dict[str, Any]:
@@ -86,86 +104,6 @@ def measured(arguments: list[str]) -> dict[str, Any]:
     command = [sys.executable, "-c", MEASURED, *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[-1])
-
-
-def _shot(folder: Path, count: int, height: int, width: int) -> None:
-    """Frames of a shot: cuts of a mosaic, every one another part of it."""
-    folder.mkdir()
-    for number in range(count):
-        mosaic.write(folder / f"{number:04}.exr", height, width, first=number)
-
-
-def _denoiser(*options: str) -> Denoiser:
-    arguments = parser().parse_args(["denoise", "none", "-o", "none", "--overwrite", *options])
-    return Denoiser(settings_of(arguments), arguments, None, 3)
-
-
-def _pipeline(shot: Path, backend: str) -> list[dict[str, Any]]:
-    """Frames per second: the work alone, the files alone, and both at once."""
-    denoiser = _denoiser("--backend", backend)
-    with tempfile.TemporaryDirectory() as out:
-        jobs = plan([shot], Path(out))[:20]
-        loaded = [denoiser.read(job) for job in jobs]
-        ready = dict(zip(jobs, map(denoiser.denoise, loaded), strict=True))
-        read = lambda job: (denoiser.read(job), job)[1]
-        every = lambda *stages: list(pipelined(jobs, *stages))
-        ways: dict[str, Callable[[], Any]] = {
-            "work alone": lambda: [denoiser.denoise(one) for one in loaded],
-            "EXR alone, in a loop": lambda: [denoiser.write(ready[read(job)]) for job in jobs],
-            "EXR alone, on two threads": lambda: every(read, ready.get, denoiser.write),
-            "one after another": lambda: [denoiser(job) for job in jobs],
-            "pipeline": lambda: every(denoiser.read, denoiser.denoise, denoiser.write),
-        }
-        return [{"backend": backend, "what": n, **_rate(jobs, way)} for n, way in ways.items()]
-
-
-def _rate(jobs: list[Job], work: Callable[[], Any]) -> dict[str, float]:
-    """Frames a second, and what a frame takes of all processors together, in milliseconds."""
-    start, busy = time.perf_counter(), time.process_time()
-    work()
-    rate = len(jobs) / (time.perf_counter() - start)
-    return {"rate": rate, "cpu": 1000 * (time.process_time() - busy) / len(jobs)}
-
-
-def _workers(shot: Path) -> list[dict[str, Any]]:
-    """Frames per second of one process alone and of Dask workers on this machine, all warm."""
-    rows = []
-    with tempfile.TemporaryDirectory() as out:
-        jobs, alone = plan([shot], Path(out)), dataclasses.replace(_denoiser(), compiled=None)
-        one = lambda: list(pipelined(jobs, alone.read, alone.denoise, alone.write))
-        one()
-        rows.append({"workers": 0, **_rate(jobs, one)})
-        for count in WORKERS:
-            with local_cluster(count) as local:
-                every = lambda to=local.scheduler_address: list(each(to, alone, jobs, failure))
-                every()
-                rows.append({"workers": count, **_rate(jobs, every)})
-    return rows
-
-
-def _killed(shot: Path) -> dict[str, Any]:
-    """Two workers, one of which is killed half way, against one process alone."""
-    with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as two:
-        denoiser = dataclasses.replace(_denoiser(), compiled=None)
-        for job in plan([shot], Path(one)):
-            denoiser(job)
-        jobs, records = plan([shot], Path(two)), []
-        with local_cluster(2) as local:
-            for record in each(local.scheduler_address, denoiser, jobs, failure):
-                records.append(record)
-                if len(records) == len(jobs) // 2:
-                    os.kill(local.workers[0].pid, signal.SIGKILL)
-        names = sorted(job.target.name for job in jobs)
-        same = [
-            (Path(one) / name).read_bytes() == (Path(two) / name).read_bytes() for name in names
-        ]
-        return {
-            "frames": len(jobs),
-            "reported once": sorted(Path(r["output"]).name for r in records) == names,
-            "failed": sum("error" in record for record in records),
-            "files": len(os.listdir(two)),
-            "identical": sum(same),
-        }
 
 
 def seams(path: Path) -> None:
@@ -198,39 +136,23 @@ def seams(path: Path) -> None:
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """large.png: memory and time by size, frames per second; large_seams.png; large_figures.md."""
+    """large.png: memory and time by size; large_seams.png; large_figures.md."""
     seams(folder / f"{NAME}_seams.png")
-    columns = {
-        "method": "method",
-        "way": "denoised",
-        "megapixels": "megapixels",
-        "MB": "peak memory, MB",
-        "seconds": "seconds",
-    }
-    text = results.table(result["memory"], columns)
-    columns = {
-        "backend": "back end",
-        "what": "a folder of frames",
-        "rate": "frames/s",
-        "cpu": "processor ms a frame",
-    }
-    text += "\n" + results.table(result["pipeline"], columns)
-    text += "\n" + results.table(result["workers"], {"workers": "workers", "rate": "frames/s"})
-    text += "\n" + results.table([result["killed"]], {name: name for name in result["killed"]})
+    columns = {"method": "method", "way": "denoised", "megapixels": "megapixels"}
+    taken = {"MB": "peak memory, MB", "seconds": "seconds", "cpu": "processor seconds"}
+    text = results.table(result["memory"], columns | taken)
+    if result["largest"]:
+        text += f"\nIn pieces, `--memory {LARGEST_MEMORY}`, and a crop where pieces meet:\n\n"
+        found = {"difference": "against the whole", "largest": "largest, of the mean"}
+        columns = {"method": "method", "megapixels": "megapixels"}
+        text += results.table(result["largest"], columns | taken | found)
     plots.write_text(folder / f"{NAME}_figures.md", text)
-    with plots.figure(folder / f"{NAME}.png", columns=3, size=(4.2, 3.6)) as (left, middle, right):
-        for axis, key, label in ((left, "MB", "peak memory, MB"), (middle, "seconds", "seconds")):
+    with plots.figure(folder / f"{NAME}.png", columns=2, size=(5, 3.8)) as axes:
+        for axis, key in zip(axes, ("MB", "seconds"), strict=True):
             for method in METHODS:
                 for way, style in (("whole", "o-"), ("in pieces", "s--")):
                     rows = [r for r in result["memory"] if (r["method"], r["way"]) == (method, way)]
                     x, y = [r["megapixels"] for r in rows], [r[key] for r in rows]
                     axis.plot(x, y, style, label=f"{method}, {way}")
-            axis.set(xlabel="megapixels", ylabel=label, ylim=(0, None))
-        left.legend(fontsize=7)
-        workers = [row for row in result["workers"] if row["workers"]]
-        alone = next(row["rate"] for row in result["workers"] if not row["workers"])
-        right.plot([r["workers"] for r in workers], [r["rate"] for r in workers], "o-")
-        right.axhline(alone, linestyle="--", color="black", label="one process alone")
-        right.set(xlabel="Dask workers", ylabel="frames a second", ylim=(0, None))
-        right.set_xticks([row["workers"] for row in workers])
-        right.legend(fontsize=7)
+            axis.set(xlabel="megapixels", ylabel=taken[key], ylim=(0, None))
+        axes[0].legend(fontsize=7)

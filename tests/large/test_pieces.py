@@ -79,10 +79,18 @@ def test_options_of_flr_hold_in_strips(rng):
     assert relative(jflnr.denoise(frame, block=4, tile=30, **options), whole) < RELATIVE
 
 
-@pytest.mark.parametrize("method", ["flr-adaptive", "flnr"])
-def test_adaptive_flr_and_flnr_in_tiles_are_themselves(rng, method):
+@pytest.mark.parametrize(
+    "method, height, width",
+    [
+        ("flr-adaptive", 70, 3584),
+        ("flnr", 45, 3001),
+        pytest.param("flnr-small", 83, 2710, marks=pytest.mark.slow),
+        pytest.param("flnr-tiny", 61, 2999, marks=pytest.mark.slow),
+    ],
+)
+def test_adaptive_flr_and_flnr_in_tiles_are_themselves(rng, method, height, width):
     """Wide enough for five tiles whose windows end before the next but one."""
-    frame = room(rng, 70, 3584)
+    frame = room(rng, height, width)
     whole = np.asarray(jflnr.denoise(frame, method))
     ours = np.asarray(jflnr.denoise(frame, method, tile=600))
     assert relative(ours, whole) < RELATIVE
@@ -101,9 +109,17 @@ def test_a_nan_in_one_strip_stays_there(rng):
 def test_a_wrong_tile_is_named(frame):
     with pytest.raises(ValueError, match="tile must be at least 1"):
         jflnr.denoise(frame, tile=0)
+
+
+@pytest.mark.parametrize(
+    "method, backend, advice",
+    [("bmfr", "jax", "raise --memory$"), ("flnr", "opencl", "or take --backend jax$")],
+)
+def test_what_cannot_be_done_in_pieces_is_named(frame, method, backend, advice):
     rows = strips.rows_of(frame)
-    with pytest.raises(ValueError, match="needs the whole frame"):
-        strips.denoise(rows, strips.Options("another", None, (), 8), 32)
+    message = f"method {method} on {backend} needs the whole frame in memory: .*{advice}"
+    with pytest.raises(ValueError, match=message):
+        strips.denoise(rows, strips.Options(method, None, (), 8, backend), 32)
 
 
 @pytest.mark.parametrize("text, size", [("4G", 4 << 30), ("1.5GiB", 3 << 29), ("800m", 800 << 20)])

@@ -66,8 +66,13 @@ def test_a_file_in_strips_is_the_file_denoised(frame_file, tmp_path, options):
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
-def test_what_needs_the_whole_frame_is_named(frame_file, tmp_path):
-    command = ["denoise", str(frame_file), "-o", str(tmp_path / "o.exr"), "--png"]
+@pytest.mark.parametrize(
+    "options",
+    ["--png", "--reference", "--method auto", "--channels all", "--method flnr --error-map"],
+)
+def test_what_needs_the_whole_frame_is_named(frame_file, tmp_path, options):
+    command = ["denoise", str(frame_file), "-o", str(tmp_path / "o.exr"), *options.split()]
     arguments = parser().parse_args(command)
-    with pytest.raises(ValueError, match="--png needs the whole frame"):
+    wanted = options.removeprefix("--method flnr ")
+    with pytest.raises(ValueError, match=f"{wanted} needs the whole frame in memory: raise"):
         denoise_in_strips(Job(frame_file, tmp_path / "o.exr"), {}, arguments, 16)
