@@ -128,6 +128,7 @@ def test_a_data_set_resumes_and_keeps_finished_frames(tmp_path: Path) -> None:
     assert (tmp_path / jobs[0].name).stat().st_mtime_ns == before and len(said) == 2
     entry = Manifest(tmp_path).entries[jobs[1].name]
     assert entry["scene"] == "forms-1" and entry["view"] == 101 and len(entry["sha256"]) == 64
+    assert Manifest(tmp_path).summary("train", 1.0).startswith("2 frames of 1 scenes")
     with pytest.raises(ValueError, match="split by scene"):
         fill(tmp_path, iter([Job("sponza", 0, 48, 27, "train")]), 9)
 

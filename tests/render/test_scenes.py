@@ -13,7 +13,8 @@ from experiments.render.lambertian import load_xml
 from experiments.render.scene import build
 from experiments.render.source import load
 from experiments.render.tracer import Tracer
-from experiments.scenes.catalogue import FAMILIES, world_of
+from experiments.scenes import rooms
+from experiments.scenes.catalogue import CALM, FAMILIES, world_of
 from experiments.scenes.world import World
 
 
@@ -34,6 +35,16 @@ def test_a_family_is_a_function_of_its_seed(family: str) -> None:
         assert np.isfinite(mesh.vertices).all() and mesh.faces.max() < len(mesh.vertices)
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-6)
         assert texture.min() >= 0 and texture.max() <= 0.95
+
+
+def test_later_scenes_have_weaker_colours_of_the_same_brightness() -> None:
+    strong, calm = rooms.furnished(CALM + 1), world_of(f"furnished-{CALM + 1}")
+    np.testing.assert_array_equal(_vertices(strong), _vertices(calm))
+    textures = [[s.material.texture for s in world.surfaces] for world in (strong, calm)]
+    for before, after in zip(*textures, strict=True):
+        np.testing.assert_allclose(after.mean(-1), before.mean(-1), atol=1e-6)
+    colour = [np.mean([t.std(-1).mean() for t in world]) for world in textures]
+    assert colour[1] < 0.8 * colour[0]
 
 
 def test_an_unknown_scene_is_named() -> None:
