@@ -8,7 +8,9 @@
 //
 // Defines beside those of the headers: STEP, distance of the models in pixels; RESTORED, if models are
 // multiplied by max(1 + rate * restored, 0) first, `restored` being (ceil(h / 2), restored_pitch), a
-// number for each 2 x 2 models (adaptive FLR, energy.cl). The models then lie as in models.h.
+// number for each 2 x 2 models (adaptive FLR, energy.cl). The models then lie as in models.h, and no
+// pixel is darker than `least` times the light of its block, `own` of floor.cl: as much of that is
+// mixed in, into all channels alike.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -31,30 +33,35 @@
 #define LEFT(i) CLAMP(cell_x + CELL(i), 0, w - 1)
 #define RIGHT(i) CLAMP(cell_x + CELL(i) + 1, 0, w - 1)
 #ifdef RESTORED
-#define BLOCK(bx) COLUMN(bx, MODELS)
-#define ROW(i, by) (model + (long)(by) * pitch * MODELS + (i) * GROUP)
+#define PLANES ((Q + 2) * C)
+#define BLOCK(bx) COLUMN(bx, count)
+#define LINE(planes, i, by, count) (planes) + (long)(by) * pitch * (count) + (i) * GROUP, count
 #else
+#define PLANES ((Q + 1) * C)
 #define BLOCK(bx) (bx)
-#define ROW(i, by) (model + ((long)(i) * h + (by)) * pitch)
 #endif
 #define AT_LEFT(i) row[BLOCK(LEFT(i))]
 #define AT_RIGHT(i) row[BLOCK(RIGHT(i))]
 
-// A coefficient along a row of block centres. from, to: factors for the models on both sides.
-INLINE real along(global const float *row, int cell_x, int w, real right, real from, real to)
+// A coefficient along a row of block centres, `count` of which lie together. from, to: factors for the
+// models on both sides.
+INLINE real along(
+    global const float *row, int count, int cell_x, int w, real right, real from, real to)
 {
     const real start = from * LANES(real, AT_LEFT), stop = to * LANES(real, AT_RIGHT);
     return start + right * (stop - start);
 }
 
 #ifdef RESTORED
-#define RESTORED_PARAMETERS \
-    , int restored_pitch, global const float *rate, global const float *restored
+#define RESTORED_PARAMETERS                                                       \
+    , int restored_pitch, global const float *rate, global const float *restored, \
+        global const float *own, float least
 #define FACTOR(bx) MAX(1 + rate[0] * restored[(long)(by / 2) * restored_pitch + (bx) / 2], 0)
 #else
 #define RESTORED_PARAMETERS
 #define FACTOR(bx) 1
 #endif
+#define BLOCK_LIGHT(c) (above[(Q + 1) * C + (c)] + below * down[(Q + 1) * C + (c)])
 #define LEFT_FACTOR(i) FACTOR(LEFT(i))
 #define RIGHT_FACTOR(i) FACTOR(RIGHT(i))
 
@@ -72,14 +79,21 @@ kernel void apply(
 
     // The models along the centres above and below, at every x of the strip.
     const real right = (LANES(real, FROM_CENTRE) + (x0 - cell_x * STEP + 0.5f)) / STEP - 0.5f;
-    real above[(Q + 1) * C], down[(Q + 1) * C];
+    real above[PLANES], down[PLANES];
 #pragma unroll
     for (int side = 0; side < 2; ++side) {
         const int by = CLAMP(cell_y + side, 0, h - 1);
         const real from = LANES(real, LEFT_FACTOR), to = LANES(real, RIGHT_FACTOR);
 #pragma unroll
-        for (int i = 0; i < (Q + 1) * C; ++i) {
-            const real value = along(ROW(i, by), cell_x, w, right, from, to);
+        for (int i = 0; i < PLANES; ++i) {
+#ifdef RESTORED
+            const real value = i < (Q + 1) * C
+                ? along(LINE(model, i, by, MODELS), cell_x, w, right, from, to)
+                : along(LINE(own, i - (Q + 1) * C, by, C), cell_x, w, right, from, to);
+#else
+            global const float *row = model + ((long)i * h + by) * pitch;
+            const real value = along(row, 1, cell_x, w, right, from, to);
+#endif
             if (side == 0)
                 above[i] = value;
             else
@@ -105,6 +119,17 @@ kernel void apply(
             for (int c = 0; c < C; ++c)
                 values[c] += x * (above[(q + 1) * C + c] + below * down[(q + 1) * C + c]);
         }
+#ifdef RESTORED
+        real light = 0, whole = 0;
+#pragma unroll
+        for (int c = 0; c < C; ++c) {
+            light += BRIGHTNESS(c) * values[c];
+            whole += BRIGHTNESS(c) * BLOCK_LIGHT(c);
+        }
+        const real share = MAX(least * whole - light, 0) / MAX(whole - light, 1e-18f);
+#pragma unroll
+        for (int c = 0; c < C; ++c) values[c] += share * (BLOCK_LIGHT(c) - values[c]);
+#endif
         if (first == 0 && last == WIDTH - 1)
             write_pixels(output + pixel * C, values, 0, WIDTH - 1);
         else

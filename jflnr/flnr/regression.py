@@ -21,7 +21,8 @@ from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.apply import apply, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import restoring_factor
-from jflnr.flr.level import Fit
+from jflnr.flr.floor import with_own_light
+from jflnr.flr.level import Fit, mean_guides
 from jflnr.flr.moments import Guides, centre
 from jflnr.flr.pyramid import double
 
@@ -38,15 +39,16 @@ class Prepared(NamedTuple):
 
     x: `(ceil(h / 2), ceil(w / 2), features.COUNT)`, where `(h, w)` are the finest blocks.
     coarsest: `(Q + 1, C, h', w')`, models of the coarsest grid. differences, shares: coarse to
-    fine, what each finer fit adds and how much of it the variances call signal. factor: `(h, w)`,
-    which gives back brightness that the weights took. mean: brightness of
-    the frame.
+    fine, what each finer fit adds and how much of it the variances call signal. guides:
+    `(Q + 1, h, w)`, means of the finest blocks. factor: `(h, w)`, which gives back brightness that
+    the weights took. mean: brightness of the frame.
     """
 
     x: jax.Array
     coarsest: jax.Array
     differences: tuple[jax.Array, ...]
     shares: tuple[jax.Array, ...]
+    guides: jax.Array
     factor: jax.Array
     mean: jax.Array
 
@@ -101,6 +103,7 @@ def prepared(
         coarsest=coarsest.coefficients,
         differences=tuple(s.fine.coefficients - s.coarse.coefficients for s in steps),
         shares=tuple(step.share for step in steps),
+        guides=mean_guides(steps[-1].grid.moments, coarsest.coefficients.shape[0] - 1),
         factor=factor,
         mean=mean,
     )
@@ -123,7 +126,8 @@ def finish(params: unet.Params, frame: Prepared) -> jax.Array:
 
 def evaluate(params: unet.Params, frame: Prepared, shift: jax.Array, guides: Guides) -> jax.Array:
     """The denoised light `(H, W, C)` of a frame from `prepare`."""
-    return apply(finish(params, frame), guides, shift, BLOCK)
+    coefficients = with_own_light(finish(params, frame), frame.guides)
+    return apply(coefficients, guides, shift, BLOCK, ADAPTIVE_DEFAULT.numbers().floor)
 
 
 def changed(share: jax.Array, change: jax.Array) -> jax.Array:

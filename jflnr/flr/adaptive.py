@@ -19,7 +19,8 @@ from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.apply import apply, apply_rows, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
-from jflnr.flr.level import Fit, Grid, brightness, fit_level, windowed
+from jflnr.flr.floor import with_own_light
+from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
 from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude
 from jflnr.flr.pyramid import halve
 from jflnr.flr.weighted_moments import collect_weighted
@@ -43,11 +44,13 @@ class Pilot(NamedTuple):
 class Fitted(NamedTuple):
     """The models of a frame, and what they were found by.
 
-    coefficients: `(Q + 1, C, h, w)`, of the finest blocks. coarsest, steps: all levels. shift:
-    `(Q,)`. mean: brightness of the frame. unit: what the light was divided by.
+    coefficients: `(Q + 1, C, h, w)`, of the finest blocks. grid: what these were fitted to.
+    coarsest, steps: all levels. shift: `(Q,)`. mean: brightness of the frame. unit: what the light
+    was divided by.
     """
 
     coefficients: jax.Array
+    grid: Grid
     coarsest: Fit
     steps: list[Step]
     shift: jax.Array
@@ -81,7 +84,7 @@ def flr_adaptive(
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
     models = fit_frame(target, guides, parameters, block, levels, weight)
-    image = apply(models.coefficients, guides, models.shift, max(block // 2, 1))
+    image = image_of(models, guides, parameters.numbers())
     if keep_energy:
         image = rescale(image, light_of(target / models.unit), weight)
     return image * models.unit
@@ -109,7 +112,14 @@ def fit_frame(
     grid = collect_grid(target, guides, shift, pilot, weight, numbers, block)
     coarsest, steps = fit_levels(grid, shift, target.shape[-1], levels, mean, numbers)
     coefficients = restore(merged_models(coarsest, steps), moments, shift.size, numbers.slack)
-    return Fitted(coefficients, coarsest, steps, shift, mean, unit)
+    return Fitted(coefficients, grid, coarsest, steps, shift, mean, unit)
+
+
+def image_of(models: Fitted, guides: Guides, numbers: AdaptiveParameters) -> jax.Array:
+    """Pass 3: the light of every pixel, `(H, W, C)`, in the fit's own unit."""
+    means = mean_guides(models.grid.moments, models.shift.size)
+    coefficients = with_own_light(models.coefficients, means)
+    return apply(coefficients, guides, models.shift, models.grid.block, numbers.floor)
 
 
 def light_of(target: jax.Array) -> jax.Array:

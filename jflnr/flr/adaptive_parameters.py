@@ -21,6 +21,7 @@ class AdaptiveParameters(NamedTuple):
     brightness_scale: so may the logarithm of the brightness.
     caution: factor on the noise that is expected in what a finer level adds.
     slack: share by which the mean brightness may differ from the input's.
+    floor: least brightness of a pixel, relative to what its model gives the whole block.
     """
 
     sigma: jax.Array | float
@@ -34,6 +35,7 @@ class AdaptiveParameters(NamedTuple):
     brightness_scale: jax.Array | float
     caution: jax.Array | float
     slack: jax.Array | float
+    floor: jax.Array | float
 
     def but(self, **numbers: float) -> AdaptiveParameters:
         """These, with some of the numbers (not their logarithms) replaced."""
@@ -47,7 +49,7 @@ class AdaptiveParameters(NamedTuple):
         return jax.tree.map(jnp.exp, self)
 
 
-ADAPTIVE_DEFAULT = AdaptiveParameters(*([0.0] * 11)).but(
+ADAPTIVE_DEFAULT = AdaptiveParameters(*([0.0] * 12)).but(
     sigma=2.0,
     eps=1e-4,
     eps_prime=1e-4,
@@ -59,4 +61,5 @@ ADAPTIVE_DEFAULT = AdaptiveParameters(*([0.0] * 11)).but(
     brightness_scale=2.0,
     caution=1.0,
     slack=0.025,
+    floor=0.2,
 )

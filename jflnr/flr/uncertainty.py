@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from jflnr.flr.adaptive import BLOCK, LEVELS, Fitted, fit_frame
+from jflnr.flr.adaptive import BLOCK, LEVELS, Fitted, fit_frame, image_of
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.apply import apply
 from jflnr.flr.level import mean_guides, predict
@@ -33,10 +33,9 @@ def flr_adaptive_with_error(
     Returns `(H, W, C)` and `(H, W, 1)`, the standard error of the image's brightness.
     """
     models = fit_frame(target, guides, parameters, BLOCK, LEVELS, weight)
-    block = BLOCK // 2
-    image = apply(models.coefficients, guides, models.shift, block)
+    image = image_of(models, guides, parameters.numbers())
     constant = jnp.zeros((*image.shape[:2], 0), image.dtype)
-    error = apply(_block_error(models)[None, None], constant, models.shift[:0], block)
+    error = apply(_block_error(models)[None, None], constant, models.shift[:0], models.grid.block)
     return image * models.unit, error * models.unit
 
 
@@ -55,7 +54,7 @@ def _block_error(models: Fitted) -> jax.Array:
         dropped = (1 - step.share) * predict(change, mean_guides(step.grid.moments, count))
         variance = double(variance, *size) + step.share * noise
         left_out = double(left_out, *size) + dropped**2
-    finest = mean_guides(models.steps[-1].grid.moments, count)
+    finest = mean_guides(models.grid.moments, count)
     level = predict(models.coefficients, finest)
     # The floor is there for its root's derivative, and for pixels that see no light.
     floor = 1e-6 * models.mean**2

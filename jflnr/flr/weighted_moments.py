@@ -10,7 +10,8 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jflnr.flr.moments import Guides, from_shift, planes, sum_columns
+from jflnr.flr.moments import Guides, from_shift, plane_count, planes, sum_columns, working_type
+from jflnr.flr.strips import cut, fill, step_of
 
 
 def collect_weighted(
@@ -27,21 +28,14 @@ def collect_weighted(
     negative, 0 where a pixel is not to be used. squares: `(H, W)`, finite.
     Returns `(K, ceil(H/block), ceil(W/block))` and `(1, ceil(H/block), ceil(W/block))`.
     """
-    inputs = (target, guides, weight, squares)
-    # Two rows of blocks at a time: enough work for one step, little enough for the cache.
-    rows = 2 * block
-    missing = -target.shape[0] % rows
 
-    def strips(image: jax.Array) -> jax.Array:
-        image = jnp.pad(image, [(0, missing)] + [(0, 0)] * (image.ndim - 1))
-        return image.reshape(image.shape[0] // rows, rows, *image.shape[1:])
+    def strip(first: jax.Array | int, rows: int) -> jax.Array:
+        return _strip(*cut((target, guides, weight, squares), first, rows), shift, block)
 
-    def one(strip: tuple[jax.Array, Guides, jax.Array, jax.Array]) -> jax.Array:
-        return _strip(*strip, shift=shift, block=block)
-
-    sums = lax.map(one, jax.tree.map(strips, inputs))
-    moments = jnp.moveaxis(sums, 0, 1).reshape(sums.shape[1], -1, sums.shape[-1])
-    moments = moments[:, : -(-target.shape[0] // block)]
+    height, width = (-(-size // block) for size in target.shape[:2])
+    count = plane_count(shift.size, target.shape[2]) + 1
+    empty = jnp.zeros((count, height, width), working_type(target, *jax.tree.leaves(guides)))
+    moments = fill(empty, 1, target.shape[0], block, step_of(block), strip)
     return moments[:-1], moments[-1:]
 
 
@@ -50,11 +44,10 @@ def _strip(
     guides: Guides,
     weight: jax.Array,
     squares: jax.Array,
-    *,
     shift: jax.Array,
     block: int,
 ) -> jax.Array:
-    """Moments of some rows of blocks: `(rows, W, ...)` to `(K + 1, rows / block, w)`."""
+    """Moments of some rows of blocks: `(rows, W, ...)` to `(K + 1, ceil(rows / block), w)`."""
     used = weight > 0
     x = [
         jnp.where(used, from_shift(plane, s), 0)
@@ -69,6 +62,9 @@ def _strip(
     products += [a * b for a in weighted for b in y]
     products.append(squares)
     # Rows first: contiguous additions; then the columns, with fewer data.
+    missing = -target.shape[0] % block
+    if missing:
+        products = [jnp.pad(product, ((0, missing), (0, 0))) for product in products]
     sums = [jnp.sum(p.reshape(-1, block, p.shape[1]), axis=1) for p in products]
     together = lax.optimization_barrier(jnp.stack(lax.optimization_barrier(sums)))
     return sum_columns(together, block) / block**2

@@ -15,6 +15,7 @@ import numpy as np
 
 from jflnr.flnr import features, regression, unet
 from jflnr.flr import adaptive, energy, widths
+from jflnr.flr.floor import with_own_light
 from jflnr.flr.level import Grid
 from jflnr.large.planes import Planes
 from jflnr.large.pyramid import REACH, Job
@@ -67,7 +68,7 @@ def _means(job: Job, moments: Planes, models: Planes, mean: jax.Array) -> jax.Ar
     guides, sums = job.common.shift.size, np.zeros(2)
     for top in range(0, models.height, ROWS):
         rows = slice(top, min(top + ROWS, models.height))
-        found = models[rows, :].reshape(guides + 1, features.CHANNELS, -1, models.width)
+        found = models[rows, :].reshape(guides + 2, features.CHANNELS, -1, models.width)[:-1]
         known = jnp.asarray(moments[rows, :][:-1])
         means = features.light_means(features.colour_of(jnp.asarray(found), known, guides), mean)
         sums += np.array([float(value) for value in means]) * found.shape[2]
@@ -83,7 +84,7 @@ def _models(
     params: unet.Params,
     block: int,
 ) -> jax.Array:
-    """The network's models of the blocks of a tile, `(Q + 1, C, h, w)`."""
+    """The network's models of the blocks of a tile, `(Q + 2, C, h, w)`."""
     grid = Grid(moments[:-1], moments[-1:], block)
     guides, channels = common.shift.size, features.CHANNELS
     numbers = common.numbers
@@ -92,4 +93,5 @@ def _models(
     )
     factor = energy.scale(jnp.ones((1, 1, *moments.shape[1:])), output, known.rate)[0, 0]
     x = features.of_steps(steps, guides, known.mean, tuple(known.means))
-    return regression.finish(params, regression.prepared(x, coarsest, steps, factor, known.mean))
+    frame = regression.prepared(x, coarsest, steps, factor, known.mean)
+    return with_own_light(regression.finish(params, frame), frame.guides)

@@ -100,7 +100,7 @@ def strips(
     with ExitStack() as files:
         light = files.enter_context(job.planes(plane_count(guides, 1), 2 * finest))
         moments = files.enter_context(job.planes(plane_count(guides, rows.channels) + 1, finest))
-        models = files.enter_context(job.planes((guides + 1) * rows.channels, finest))
+        models = files.enter_context(job.planes((guides + 2) * rows.channels, finest))
         count, wanted = _collect_light(job, light)
         mean = jnp.float32(wanted / count if wanted > 0 else 1)
         _collect_moments(job, _pilot(job, light, mean), mean, moments)

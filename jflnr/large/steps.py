@@ -12,7 +12,8 @@ from jflnr import guides as guide_layers
 from jflnr.flr import adaptive, energy, widths
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.apply import apply_rows
-from jflnr.flr.level import Grid
+from jflnr.flr.floor import with_own_light
+from jflnr.flr.level import Grid, mean_guides
 from jflnr.flr.moments import Guides
 from jflnr.frame import Frame
 from jflnr.inputs import adaptive_images
@@ -79,22 +80,25 @@ def models_of_tile(
     channels: int,
     block: int,
 ) -> tuple[jax.Array, jax.Array]:
-    """Models of the finest blocks `(Q + 1, C, h, w)`, and the brightness `(h/2, w/2)` they give."""
+    """Models of the finest blocks `(Q + 2, C, h, w)`, the last row from `floor.with_own_light`, and
+    the brightness `(h/2, w/2)` they give."""
     grid = Grid(moments[:-1], moments[-1:], block)
     guides = common.shift.size
     levels = adaptive.LEVELS
     models = widths.merged_models(
         *widths.fit_levels(grid, common.shift, channels, levels, mean, common.numbers)
     )
-    return models, energy.block_light(models, light, guides)
+    output = energy.block_light(models, light, guides)
+    return with_own_light(models, mean_guides(grid.moments, guides)), output
 
 
 @_on_pixels
 def image_of_strip(
     strip: Frame, models: jax.Array, common: Common, names: tuple[str, ...], block: int
 ) -> jax.Array:
-    """Pass 3: the denoised light `(H, W, C)`. models: `(Q + 1, C, h + 2, w)`."""
-    return apply_rows(models, _images(strip, common, names)["guides"], common.shift, block)
+    """Pass 3: the denoised light `(H, W, C)`. models: `(Q + 2, C, h + 2, w)`."""
+    guides = _images(strip, common, names)["guides"]
+    return apply_rows(models, guides, common.shift, block, common.numbers.floor)
 
 
 def _images(strip: Frame, common: Common, names: tuple[str, ...]) -> dict:

@@ -11,10 +11,11 @@ from jflnr import checks
 from jflnr.flr.adaptive import BLOCK, LEVELS
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.arguments import channel_count, check_regression
-from jflnr.opencl.apply import apply
+from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.energy import frame_mean, rescale, restore
+from jflnr.opencl.floor import own_light
 from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import fit_level
 from jflnr.opencl.merge import merge, signal_share
@@ -79,10 +80,10 @@ def _denoise(
     numbers = jax.tree.map(lambda number: math.exp(float(number)), parameters)
     run = Run(context, count, channels, numbers, shift, mean)
     pilot = fit_pilot(run, moments, w, block)
-    merged = fit_pyramid(
-        run, collect_weighted(run, target, guides, pilot, weight, block), block, levels
-    )
-    restored = restore(run, merged, moments, w)
+    grid = collect_weighted(run, target, guides, pilot, weight, block)
+    merged = fit_pyramid(run, grid, block, levels)
+    scale, own = restore(run, merged, moments, w), own_light(run, merged, grid)
+    restored = Restored(*scale, own, numbers.floor)
     apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
 
 

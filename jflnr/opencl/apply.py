@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from jflnr.opencl.context import Context
+from jflnr.opencl.grids import Grid, brightness_defines
 from jflnr.opencl.moments import guide_arguments, guide_defines
+
+
+class Restored(NamedTuple):
+    """What is done to the light of adaptive FLR's models.
+
+    rate, brightness: what they are scaled by, from `energy.restore`. own: light of the blocks, from
+    `floor.own_light`. floor: least brightness of a pixel, relative to that.
+    """
+
+    rate: Any
+    brightness: Any
+    own: Grid
+    floor: float
 
 
 def apply(
@@ -16,15 +30,13 @@ def apply(
     step: int,
     sizes: tuple[int, int, int],
     output: Any,
-    restored: tuple[Any, Any] | None = None,
+    restored: Restored | None = None,
 ) -> None:
     """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
 
     model: `(Q + 1, C, h, pitch)`, from `solve`. guides: each `(H, W, Q_i)`. shift: `(max(Q, 1),)`.
-    step: distance of the models in pixels. sizes: blocks down
-    and across, and pitch. output:
-    `(H, W, C)`, float32 or float16, is written. restored: from `energy.restore`, or
-    None; the model is then as in kernels_cl/models.h.
+    step: distance of the models in pixels. sizes: blocks down and across, and pitch. output:
+    `(H, W, C)`, float32 or float16, is written. restored: for models as in kernels_cl/models.h.
     """
     height, width, channels = output.shape
     h, w, pitch = sizes
@@ -36,9 +48,9 @@ def apply(
         width, height, h, w, pitch, model, *guide_arguments(guides), shift, output
     ]  # fmt: skip
     if restored is not None:
-        rate, brightness = restored
-        defines["RESTORED"] = 1
-        arguments += [brightness.shape[1], rate, brightness]
+        rate, brightness, own, floor = restored
+        defines |= {"RESTORED": 1} | brightness_defines(channels)
+        arguments += [brightness.shape[1], rate, brightness, own.planes, floor]
     # A vector lies in a cell between four block centres, or covers several side by side.
     strips = -(-(w + 1) // max(lanes // step, 1)) * -(-step // lanes)
     context.run("apply", "apply.cl", defines, (strips, h + 1), arguments)

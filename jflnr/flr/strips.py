@@ -1,0 +1,48 @@
+"""Passes over the pixels strip by strip, so that what happens to a strip stays in the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+from jax import lax
+
+# Rows of pixels that are worked on at a time: enough to keep cores busy.
+ROWS = 16
+
+
+def step_of(block: int) -> int:
+    """About `ROWS` rows of pixels, in whole rows of blocks."""
+    return max(ROWS // block, 1) * block
+
+
+def fill(
+    array: jax.Array,
+    axis: int,
+    height: int,
+    block: int,
+    step: int,
+    make: Callable[[jax.Array | int, int], jax.Array],
+) -> jax.Array:
+    """Fill `array` along `axis`, where it has a row for every `block` rows of pixels.
+
+    Nothing but the array itself is as large as the frame: strips that were put together afterwards
+    would be there twice.
+
+    height: of the frame, in pixels. step: rows of pixels at a time, a multiple of `block`. make:
+    what belongs into the array for some rows of pixels, given the first and their number.
+    """
+    whole, rest = divmod(height, step)
+
+    def add(strip: jax.Array | int, array: jax.Array, rows: int) -> jax.Array:
+        made = make(strip * step, rows)
+        return lax.dynamic_update_slice_in_dim(array, made, strip * (step // block), axis)
+
+    if whole:
+        array = lax.fori_loop(0, whole, lambda strip, array: add(strip, array, step), array)
+    return add(whole, array, rest) if rest else array
+
+
+def cut(images: jax.Array, first: jax.Array | int, rows: int) -> jax.Array:
+    """Some rows of every image `(H, W, ...)` of a pytree."""
+    return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows), images)
