@@ -44,10 +44,8 @@ def wanted(arguments: argparse.Namespace) -> bool:
     from jflnr.temporal.sequence import METHODS
 
     checks.choice("--method, of a shot,", arguments.method, (*METHODS, "bmfr"))
-    if arguments.backend != "jax" and (arguments.method != "bmfr" or arguments.history):
-        raise ValueError(
-            "shots are denoised on the jax backend, but for --method bmfr without --history"
-        )
+    if arguments.backend != "jax" and arguments.history is not None:
+        raise ValueError("--history keeps what the jax backend remembers: leave out --backend")
     return True
 
 
@@ -200,14 +198,14 @@ class _Running:
 
 def _functions(settings: dict[str, Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """What makes the first state, and what denoises the next frame."""
+    on_device, options = settings["backend"] == "opencl", dict[str, Any]()
     if settings["method"] == "bmfr":
-        backend = "jflnr.opencl" if settings["backend"] == "opencl" else "jflnr.temporal"
-        bmfr = importlib.import_module(f"{backend}.bmfr")
-        return bmfr.start, bmfr.step
-    from jflnr import temporal
-
-    own = {name: settings[name] for name in ("method", "guides", "parameters")}
-    return temporal.start, functools.partial(temporal.step, **own)
+        name = "jflnr.opencl.bmfr" if on_device else "jflnr.temporal.bmfr"
+    else:
+        name = "jflnr.opencl.temporal" if on_device else "jflnr.temporal"
+        options = {key: settings[key] for key in ("method", "guides", "parameters")}
+    module = importlib.import_module(name)
+    return module.start, functools.partial(module.step, **options)
 
 
 def _options(arguments: argparse.Namespace) -> dict[str, str]:

@@ -13,19 +13,25 @@ import jax
 import jax.numpy as jnp
 
 from jflnr.flr.adaptive import light_of
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
 from jflnr.flr.apply import apply
-from jflnr.flr.level import Grid, fit_level, mean_guides, predict, windowed
-from jflnr.flr.moments import Guides, centre
+from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict, windowed
+from jflnr.flr.moments import Guides, centre, collect
 from jflnr.flr.weighted_moments import collect_weighted
 from jflnr.flr.widths import guide_features
 from jflnr.flr.window import gather
 
-# Side of the blocks in pixels. Windows reach over two of them: from one sample per pixel less
-# cannot be told from noise.
-BLOCK = 16
+# Side of the blocks in pixels. Windows have a standard deviation of two of them: from one sample
+# per pixel less cannot be told from noise.
+BLOCK = 32
 # Share of the newest frame in the evidence.
-NEWEST = 0.3
+NEWEST = 0.5
+# How much of the evidence for a change goes with it when it is added; the rest says that it goes on.
+FOLLOWED = 0.7
+# Changes count relative to the brightness, of which this share of the frame's mean is added.
+DIM = 0.3
+# Frames of noise that the history takes on where the light is all new: how wrong its details are.
+NOVELTY = 10.0
 
 
 class Evidence(NamedTuple):
@@ -35,6 +41,14 @@ class Evidence(NamedTuple):
     """
 
     power: jax.Array
+    noise: jax.Array
+
+
+class Change(NamedTuple):
+    """What has changed. signal: `(H, W, C)`, to be added to the history. noise: `(H, W, 1)`, what
+    the history takes on by it, in variances of one frame."""
+
+    signal: jax.Array
     noise: jax.Array
 
 
@@ -51,45 +65,70 @@ def find_change(
     weight: jax.Array,
     evidence: Evidence,
     caution: jax.Array | float,
-) -> tuple[jax.Array, jax.Array, Evidence]:
+) -> tuple[Change, Evidence]:
     """What of the difference between a new frame and the history is signal.
-
-    The variance of the fit is told by its residuals, which without a change are the differences
-    themselves (as in `level.py`). As in `merge.py` the Wiener filter keeps the share
-    `max(power - caution noise, 0) / power`, here of a power averaged over windows and frames: a
-    change goes on for some frames, and noise does not.
 
     difference: `(H, W, C)`. expected: `(H, W)`, brightness of the history, for the weights of
     `adaptive.py`. guides: `(H, W, Q)` or several. weight: `(H, W)`, 0 where there is no history.
-    Returns the signal, `(H, W, C)`, its share, `(H, W, 1)`, and the evidence for the next frame.
+    Returns the change, and the evidence for the next frame.
     """
-    numbers = ADAPTIVE_DEFAULT.numbers()
-    channels, shift = difference.shape[-1], centre(guides)
-    unit = _mean(expected, weight)
+    numbers, shift, unit = ADAPTIVE_DEFAULT.numbers(), centre(guides), _mean(expected, weight)
     difference, expected = difference / unit, jnp.maximum(expected / unit, 0)
     light = light_of(difference)
-    weight = jnp.where(jnp.isfinite(light), weight / (expected + numbers.offset), 0)
+    usable = jnp.isfinite(light)
+    for layer in jax.tree.leaves(guides):
+        usable &= jnp.all(jnp.isfinite(layer), axis=-1)
+    weight = jnp.where(usable, weight / (expected + numbers.offset), 0)
     squares = jnp.where(weight > 0, weight * light, 0) ** 2
     grid = Grid(*collect_weighted(difference, guides, shift, weight, squares, BLOCK), BLOCK)
-    features = guide_features(grid, shift.size, numbers)
-    system = windowed(grid, features, shift, channels, jnp.ones(()), numbers)
-    fit = fit_level(system, shift.size, channels)
-    found = predict(fit.coefficients, mean_guides(grid.moments, shift.size)) ** 2
-    there = grid.moments[0] > 1e-12
-    now = gather(jnp.where(there, jnp.stack([found, fit.variance]), 0), fit.window)
-    evidence = Evidence(
-        *(old + NEWEST * (new - old) for old, new in zip(evidence, now, strict=True))
-    )
-    power = jnp.maximum(evidence.power, 1e-12)
-    share = jnp.maximum(power - caution * evidence.noise, 0) / power * there
-    # What is added to the history now will not be found again.
-    evidence = evidence._replace(power=evidence.power * (1 - share) ** 2)
+    count, total = collect(expected[..., None], (), shift[:0], BLOCK, weight)
+    fit = _fit(grid, shift, difference.shape[-1], numbers)
+    found = predict(fit.coefficients, mean_guides(grid.moments, shift.size))
+    level = total / jnp.maximum(count, 1e-12)
+    share, noise, evidence = _judge(fit, found, level, grid.moments[0] > 1e-12, evidence, caution)
     signal = apply(share * fit.coefficients, guides, shift, BLOCK)
-    pixels = apply(share[None, None], jnp.zeros((*weight.shape, 0)), shift[:0], BLOCK)
-    return signal * unit, pixels, evidence
+    noise = apply(noise[None, None], jnp.zeros((*light.shape, 0)), shift[:0], BLOCK)
+    return Change(signal * unit, noise), evidence
 
 
 def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:
     """Over the pixels that count; 1 where there is no light."""
     mean = jnp.sum(brightness * weight) / jnp.maximum(jnp.sum(weight), 1e-12)
     return jnp.where(mean > 0, mean, 1)
+
+
+def _fit(grid: Grid, shift: jax.Array, channels: int, numbers: AdaptiveParameters) -> Fit:
+    """Its variance is told by its residuals (as in `level.py`), which without a change are the
+    differences themselves."""
+    features = guide_features(grid, shift.size, numbers)
+    system = windowed(grid, features, shift, channels, jnp.ones(()), numbers)
+    return fit_level(system, shift.size, channels)
+
+
+def _judge(
+    fit: Fit,
+    found: jax.Array,
+    level: jax.Array,
+    there: jax.Array,
+    evidence: Evidence,
+    caution: jax.Array | float,
+) -> tuple[jax.Array, jax.Array, Evidence]:
+    """How much of the fit is signal, and how wrong that makes the details of the history.
+
+    As in `merge.py` the Wiener filter keeps the share `max(power - caution noise, 0) / power`, here
+    of a power averaged over windows and frames: a change goes on for some frames, and noise does
+    not. Most of what is added to the history now will not be found again. The details are the more
+    wrong, the more of the light is new.
+
+    found, level: `(h, w)`, brightness of the fit and of the history. there: `(h, w)`, boolean.
+    Returns the share and the noise, `(h, w)`, and the evidence for the next frame.
+    """
+    relative = 1 / (level + DIM) ** 2
+    planes = found**2 * relative, fit.variance * relative, found**2, level**2, 0 * level + 1
+    power, noise, new, old, count = gather(jnp.where(there, jnp.stack(planes), 0), fit.window)
+    power = jnp.maximum(evidence.power + NEWEST * (power - evidence.power), 1e-12)
+    noise = evidence.noise + NEWEST * (noise - evidence.noise)
+    share = jnp.where(there, jnp.maximum(power - caution * noise, 0) / power, 0)
+    new *= share**2
+    wrong = NOVELTY * new / (new + old + 0.01 * count + 1e-12)
+    return share, wrong, Evidence(power * (1 - FOLLOWED * share), noise)

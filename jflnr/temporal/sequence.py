@@ -22,7 +22,7 @@ from jflnr.flr.regression import flr
 from jflnr.frame import Array, Frame
 from jflnr.inputs import adaptive_images, prepare
 from jflnr.temporal.accumulate import Average, accumulate, nothing, reproject
-from jflnr.temporal.change import Evidence, find_change, no_evidence
+from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
 from jflnr.temporal.reproject import Surface, find_taps
 
 METHODS = ("flr", "flr-adaptive", *flnr.METHODS)
@@ -38,7 +38,7 @@ class Temporal(NamedTuple):
 
     light: float = 0.05
     image: float = 0.3
-    caution: float = 2.5
+    caution: float = 3.5
 
 
 class State(NamedTuple):
@@ -80,6 +80,17 @@ def step(
 
     Raises `ValueError` or `TypeError` naming the argument.
     """
+    names, inputs = prepared(state, frame, method, guides)
+    parameters = parameters_of(method, parameters)
+    support = support_of(parameters, max(frame.normal.shape)) if method == "flr" else 0
+    surface, temporal = Surface.of(frame), temporal or Temporal()
+    return _step(state, inputs, frame.motion, surface, parameters, temporal, method, names, support)
+
+
+def prepared(
+    state: State, frame: Frame, method: str, guides: Sequence[str] | None
+) -> tuple[tuple[str, ...], Frame]:
+    """Names of the guides, and the layers to denoise, if method, state and frame fit together."""
     checks.choice("method", method, METHODS)
     names, inputs = prepare(frame, guides)
     if frame.motion is None:
@@ -95,13 +106,11 @@ def step(
             f"the state is of frames of shape {state.light.mean.shape}, and this frame's indirect "
             f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
         )
-    parameters = _parameters(parameters, method)
-    support = support_of(parameters, max(frame.motion.shape)) if method == "flr" else 0
-    surface, temporal = Surface.of(frame), temporal or Temporal()
-    return _step(state, inputs, frame.motion, surface, parameters, temporal, method, names, support)
+    return names, inputs
 
 
-def _parameters(given: Any, method: str) -> Any:
+def parameters_of(method: str, given: Any) -> Any:
+    """The method's parameters, those that are given or else the default."""
     default: Any = DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
     if method in flnr.METHODS:
         from jflnr.flnr import weights
@@ -132,7 +141,7 @@ def _step(
     taps = find_taps(motion, surface, state.surface)
     light, image = reproject(state.light, taps), reproject(state.image, taps)
     known = light.samples[..., 0] > 0
-    signal, share, evidence = find_change(
+    change, evidence = find_change(
         jnp.asarray(frame.indirect) - light.mean,
         light_of(image.mean),
         guides,
@@ -140,17 +149,17 @@ def _step(
         state.evidence,
         temporal.caution,
     )
-    light = accumulate(_changed(light, signal, share), frame.indirect, temporal.light)
+    light = accumulate(_changed(light, change), frame.indirect, temporal.light)
     weight = light.samples[..., 0] if mask is None else jnp.where(mask, light.samples[..., 0], 0)
     fitted = _fit(light.mean, guides, weight, parameters, method, support)
-    image = accumulate(_changed(image, signal, share), fitted, temporal.image)
+    image = accumulate(_changed(image, change), fitted, temporal.image)
     return State(surface, light, image, evidence), image.mean
 
 
-def _changed(average: Average, signal: jax.Array, share: jax.Array) -> Average:
-    """An average that follows the light. What is added has the noise of one frame."""
+def _changed(average: Average, change: Change) -> Average:
+    """An average that follows the light."""
     mean, n = average
-    return Average(jnp.where(n > 0, mean + signal, 0), n / (1 + share * n))
+    return Average(jnp.where(n > 0, mean + change.signal, 0), n / (1 + change.noise * n))
 
 
 def _fit(

@@ -1,33 +1,13 @@
 // BMFR, phase I: the mean of the noisy samples at each place, with an age limit (Koskela et al. 2019,
 // section 3.2).
 //
-// Defines beside those of the headers: DEPTHS, if the frames have no position; surfaces are then told
-// apart by their depth. MOST, the largest count.
+// Define beside those of the headers: MOST, the largest count.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "images.h"
 #include "bmfr/taps.h"
-
-#define DOT(a, b) ((a)[0] * (b)[0] + (a)[1] * (b)[1] + (a)[2] * (b)[2])
-
-typedef struct {
-    real normal[3], position[3], depth;
-} Surface;
-
-// Whether two pixels show one surface: see `_alike` in jflnr/temporal/reproject.py.
-INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal)
-{
-#ifdef DEPTHS
-    const real apart = there.depth - here.depth;
-#else
-#pragma unroll
-    for (int c = 0; c < 3; ++c) there.position[c] -= here.position[c];
-    const real apart = DOT(here.normal, there.position);
-#endif
-    const mask turned = DOT(here.normal, there.normal) < same_normal;
-    return (ABS(apart) <= tolerance) & (turned == 0) & (here.depth > 0) & (there.depth > 0);
-}
+#include "temporal/surface.h"
 
 // Global size (W / WIDTH, H). All images (H, W, 3), but motion (H, W, 2), surface, depth, count
 // and accepted (H, W). surface: above 0 where samples count. before_...: of the previous frame; where
@@ -60,13 +40,8 @@ kernel void accumulate_light(
     real samples = 0;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        Surface there;
-#pragma unroll
-        for (int c = 0; c < 3; ++c) {
-            there.normal[c] = at(before_normal, 3, c, taps.pixel[i]);
-            there.position[c] = at(before_position, 3, c, taps.pixel[i]);
-        }
-        there.depth = at(before_depth, 1, 0, taps.pixel[i]);
+        const Surface there =
+            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
         const real known = at(before_count, 1, 0, taps.pixel[i]);
         const mask accept =
             alike(here, there, tolerance, same_normal) & (known > 0) & (taps.weight[i] > 0);

@@ -16,6 +16,7 @@ from jflnr.cli import main
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.shots import shots_of
 from jflnr.frame import Frame, read_frame, write_frame
+from jflnr.opencl import NoDevice, all_devices
 from jflnr.temporal import bmfr
 
 NAMES = [f"f_{i}.exr" for i in (1, 2, 3, 10)]  # in an order that is not that of the alphabet
@@ -185,7 +186,7 @@ Refusal = Callable[[Path, Path], list[object]]
         (lambda shot, state: [shot, "--history", state, "--method", "flr-adaptive"], "--method"),
         (lambda shot, state: [shot, "--history", shot / NAMES[0]], "not a history"),
         (lambda shot, state: [shot, "--block", "4"], "--block"),
-        (lambda shot, state: [shot, "--backend", "opencl"], "jax backend"),
+        (lambda shot, state: [shot, "--history", state, "--backend", "opencl"], "jax backend"),
         (lambda shot, state: [shot, "--method", "auto"], "flr-adaptive"),
         (lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal"], "--guides"),
         (lambda shot, state: [shot, shot.parent / "b", "--history", state], "one shot"),
@@ -265,3 +266,14 @@ def test_shots_keep_the_order_of_their_folders() -> None:
         ["b/1", "b/2"],
         ["a/9", "a/10"],
     ]
+
+
+def test_the_kernels_give_the_same(shot: Path, tmp_path: Path) -> None:
+    try:
+        all_devices()
+    except NoDevice as error:
+        pytest.skip(str(error))
+    for backend in ("jax", "opencl"):
+        assert run(shot, "-o", tmp_path / backend, "--backend", backend) == 0
+    ours, right = (light(tmp_path / backend / NAMES[-1]) for backend in ("opencl", "jax"))
+    np.testing.assert_allclose(ours, right, atol=1e-3 * right.max())

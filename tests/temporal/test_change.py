@@ -11,7 +11,7 @@ HEIGHT, WIDTH = 96, 128
 Y, X = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32) / WIDTH
 GUIDES = np.stack([np.where(X < 0.5, 1, 0), np.where(X < 0.5, 0, 1), 1 + Y], -1).astype(np.float32)
 BEFORE = (0.5 + Y + (X < 0.5)).astype(np.float32)
-CAUTION = 2.5
+CAUTION = 3.5
 
 find_jit = jax.jit(find_change)
 
@@ -25,24 +25,25 @@ def sparse_noise(light: np.ndarray, seed: int) -> np.ndarray:
 def follow(
     after: np.ndarray, frames: int, weight: np.ndarray | None = None, scale: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The history's light after some frames of `after`, with what was found added to it, and the
-    mean share in each."""
+    """The history's light after some frames of `after`, with what was found added to it, and how
+    much that was in each, of its brightness."""
     history, evidence = BEFORE[..., None] * np.ones(3, np.float32), no_evidence(HEIGHT, WIDTH)
     weight = np.ones_like(BEFORE) if weight is None else weight
-    shares = []
+    found = []
     for seed in range(frames):
         difference = sparse_noise(after, seed) - history
-        signal, share, evidence = find_jit(
+        change, evidence = find_jit(
             scale * difference, scale * history[..., 1], GUIDES, weight, evidence, CAUTION
         )
-        history = history + np.asarray(signal) / scale
-        shares.append(np.mean(share))
-    return history, np.array(shares)
+        signal = np.asarray(change.signal) / scale
+        found.append(np.mean(np.abs(signal)) / np.mean(history))
+        history = history + signal
+    return history, np.array(found)
 
 
 def test_noise_is_no_change() -> None:
-    history, shares = follow(BEFORE, 6)
-    assert shares.mean() < 0.1
+    history, found = follow(BEFORE, 6)
+    assert found.mean() < 0.03
     np.testing.assert_allclose(history[..., 0], BEFORE, rtol=0.2)
 
 
@@ -57,8 +58,8 @@ def test_a_light_that_is_switched_on_is_followed() -> None:
 
 
 def test_what_was_found_is_not_found_again() -> None:
-    _, shares = follow(3 * BEFORE, 8)
-    assert shares[0] > 0.9 and shares[4:].mean() < 0.1
+    _, found = follow(3 * BEFORE, 8)
+    assert found[0] > 1.5 and found[4:].mean() < 0.1
 
 
 def test_the_unit_of_light_does_not_matter() -> None:
@@ -67,9 +68,9 @@ def test_the_unit_of_light_does_not_matter() -> None:
 
 
 def test_where_there_is_no_history_nothing_is_found() -> None:
-    history, shares = follow(2 * BEFORE, 1, weight=np.zeros_like(BEFORE))
+    history, found = follow(2 * BEFORE, 1, weight=np.zeros_like(BEFORE))
     np.testing.assert_array_equal(history[..., 0], BEFORE)
-    assert shares == [0]
+    assert found == [0]
 
 
 def test_a_pixel_that_is_not_finite_does_not_count() -> None:

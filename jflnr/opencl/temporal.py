@@ -1,0 +1,147 @@
+"""Denoising with a history on an OpenCL device: the steps of jflnr/temporal/sequence.py."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jflnr import flnr
+from jflnr.denoising import support_of
+from jflnr.frame import Frame
+from jflnr.inputs import adaptive_images
+from jflnr.opencl import adaptive, network, noisy_guides, regression
+from jflnr.opencl.arguments import to_layers
+from jflnr.opencl.bmfr import to_device
+from jflnr.opencl.context import Context, default_context
+from jflnr.opencl.grids import brightness_defines
+from jflnr.opencl.temporal_change import Change, find_change, no_evidence
+from jflnr.temporal.accumulate import Average
+from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
+from jflnr.temporal.sequence import State, Temporal, parameters_of, prepared
+
+PARTS = {f"PART_{i}": 0 for i in range(5)}
+
+
+def start(frame: Frame, context: Context | None = None) -> State:
+    """`jflnr.temporal.start`, on the device."""
+    context = default_context() if context is None else context
+    height, width = frame.normal.shape[:2]
+    zeros = lambda channels: context.array(np.zeros((height, width, channels), np.float32))
+    surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))
+    light, image = (Average(zeros(3), zeros(1)) for _ in range(2))
+    return State(surface, light, image, no_evidence(context, height, width))
+
+
+def step(
+    state: State,
+    frame: Frame,
+    method: str = "flr-adaptive",
+    *,
+    guides: Sequence[str] | None = None,
+    parameters: Any = None,
+    temporal: Temporal | None = None,
+    context: Context | None = None,
+    on_device: bool = False,
+) -> tuple[State, Any]:
+    """`jflnr.temporal.step` on an OpenCL device: same arguments, same result.
+
+    state: from `start` or the frame before, its arrays on the device. The layers of the frame are
+    read again in the next step and must not change before. context and on_device: as in
+    `jflnr.opencl.flr`.
+
+    Raises `ValueError` or `TypeError` naming the argument; `NoDevice` without a device.
+    """
+    context = default_context() if context is None else context
+    names, inputs = prepared(state, frame, method, guides)
+    parameters, temporal = parameters_of(method, parameters), temporal or Temporal()
+    smooth = lambda *layers: noisy_guides.smooth_guide(*layers, context)
+    layers = to_layers(context, adaptive_images(inputs, names, smooth=smooth)["guides"])
+    sample, motion = (to_device(context, layer) for layer in (frame.indirect, frame.motion))
+    surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
+    covered = to_device(context, frame.depth * 0 + 1 if frame.mask is None else frame.mask)
+
+    light, image, expected, known = reproject(context, state, surface, motion, covered)
+    change, evidence = find_change(
+        context, sample, light.mean, expected, known, layers, state.evidence, temporal.caution
+    )
+    least = temporal.light, temporal.image
+    light, weight = accumulate(context, light, change, sample, covered, least[0])
+    fitted = _fit(context, light.mean, layers, weight, parameters, method)
+    image, _ = accumulate(context, image, change, fitted, covered, least[1])
+    following = State(surface, light, image, evidence)
+    context.finish(image.mean, image.mean)
+    return following, image.mean if on_device else image.mean.get()
+
+
+def reproject(
+    context: Context, state: State, surface: Surface, motion: Any, covered: Any
+) -> tuple[Average, Average, Any, Any]:
+    """Both averages where their pixels are now; brightness of the image there, `(H, W)`; and 1
+    where there is a history and something to denoise, else 0, `(H, W)`.
+
+    covered: `(H, W, 1)`, above 0 where there is something to denoise.
+    """
+    height, width = motion.shape[:2]
+    light, image = (_new_average(context, height, width) for _ in range(2))
+    expected, known = context.empty((height, width)), context.empty((height, width))
+    before = state.surface
+    depths = surface.position is None
+    # Surfaces without a position are told apart by depth; what stands in its place is not used.
+    places = [s.normal if depths else s.position for s in (surface, before)]
+    arguments = (
+        width, height, OFF_PLANE, SAME_NORMAL, covered, motion, surface.normal, surface.depth,
+        places[0], before.normal, before.depth, places[1], *state.light, *state.image, *light,
+        *image, expected, known,
+    )  # fmt: skip
+    lanes = context.width() if width >= context.width() else 1
+    defines = {"Q": 0, "C": 3, "WIDTH": lanes, **PARTS, **brightness_defines(3)}
+    defines |= {"DEPTHS": 1} if depths else {}
+    size = -(-width // lanes), height
+    context.run("reproject", "temporal/reproject.cl", defines, size, arguments)
+    return light, image, expected, known
+
+
+def accumulate(
+    context: Context,
+    before: Average,
+    change: Change,
+    image: Any,
+    covered: Any,
+    least: float,
+) -> tuple[Average, Any]:
+    """An average that follows the change, with `image` in it; its samples where there is something
+    to denoise, else 0, `(H, W)`.
+
+    image: `(H, W, 3)`. covered: `(H, W, 1)`. least: share of the image.
+    """
+    height, width = image.shape[:2]
+    average, weight = _new_average(context, height, width), context.empty((height, width))
+    lanes = context.width() if height * width >= context.width() else 1
+    defines = {"Q": 0, "C": 3, "WIDTH": lanes, **PARTS}
+    arguments = (
+        height * width, least, change.unit, *before, change.signal, change.noise, image, covered,
+        *average, weight,
+    )  # fmt: skip
+    size = (-(-height * width // lanes),)
+    context.run("accumulate", "temporal/accumulate.cl", defines, size, arguments)
+    return average, weight
+
+
+def _new_average(context: Context, height: int, width: int) -> Average:
+    return Average(context.empty((height, width, 3)), context.empty((height, width, 1)))
+
+
+def _fit(
+    context: Context, target: Any, guides: Any, weight: Any, parameters: Any, method: str
+) -> Any:
+    """The spatial method; see `jflnr.temporal.sequence`."""
+    options: dict[str, Any] = {"weight": weight, "context": context, "on_device": True}
+    if method == "flr":
+        support = support_of(parameters, max(target.shape))
+        return regression.flr(target, guides, parameters, support=support, **options)
+    if method in flnr.METHODS:
+        return network.flnr(target, guides, parameters, **options)
+    return adaptive.flr_adaptive(target, guides, parameters, **options)

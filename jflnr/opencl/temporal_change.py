@@ -1,0 +1,129 @@
+"""How the light has changed: host side of kernels_cl/temporal/difference.cl and change.cl.
+
+Its twin in JAX is jflnr/temporal/change.py.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.moments import plane_count
+from jflnr.flr.window import REACH
+from jflnr.opencl.apply import apply
+from jflnr.opencl.context import Context
+from jflnr.opencl.grids import GROUP, Grid, Run, brightness_defines
+from jflnr.opencl.level import Level, fit_level
+from jflnr.opencl.moments import centre, collect
+from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY
+
+NUMBERS = jax.tree.map(lambda number: math.exp(float(number)), ADAPTIVE_DEFAULT)
+# Planes that are averaged over the windows, see change.cl.
+PLANES = 5
+
+
+class Change(NamedTuple):
+    """What has changed. signal: `(H, W, 3)`, in units. noise: `(H, W, 1)`. unit: `(1,)`."""
+
+    signal: Any
+    noise: Any
+    unit: Any
+
+
+def no_evidence(context: Context, height: int, width: int) -> Any:
+    """Before the first frame: power and noise, two planes of a grid."""
+    h, w = -(-height // BLOCK), -(-width // BLOCK)
+    return context.array(np.zeros((h, -(-w // GROUP), 2, GROUP), np.float32))
+
+
+def find_change(
+    context: Context,
+    sample: Any,
+    light: Any,
+    expected: Any,
+    known: Any,
+    guides: tuple[Any, ...],
+    evidence: Any,
+    caution: float,
+) -> tuple[Change, Any]:
+    """`jflnr.temporal.change.find_change`, of device arrays.
+
+    sample, light: `(H, W, 3)`, the new frame and the history. expected, known: `(H, W)`, brightness
+    of the history, and 1 where there is one.
+    """
+    target, weight, unit = _difference(context, sample, light, expected, known)
+    shift, mean = centre(context, guides), context.array(np.ones(2, np.float32))
+    moments = collect(context, target, guides, shift, BLOCK, weight)
+    count = sum(layer.shape[2] for layer in guides)
+    run = Run(context, count, 3, NUMBERS, shift, mean)
+    grid, level = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
+    fit = fit_level(run, grid, BLOCK)
+    model, wrong, evidence = _judge(run, fit, level, evidence, caution)
+    signal, noise = context.empty(sample.shape), context.empty((*sample.shape[:2], 1))
+    apply(context, model, guides, shift, BLOCK, grid.sizes, signal)
+    apply(context, wrong, (), shift, BLOCK, grid.sizes, noise)
+    return Change(signal, noise, unit), evidence
+
+
+def _difference(
+    context: Context, sample: Any, light: Any, expected: Any, known: Any
+) -> tuple[Any, Any, Any]:
+    """Target `(H, W, 5)` and weight `(H, W)` for the moments, and the unit, `(1,)`."""
+    height, width = sample.shape[:2]
+    rows, unit = context.empty((height, 2)), context.empty((1,))
+    lanes = context.width() if width >= context.width() else 1
+    defines = {"Q": 0, "C": 5, "WIDTH": lanes, **{f"PART_{i}": 0 for i in range(5)}}
+    defines |= brightness_defines(3)
+    file = "temporal/difference.cl"
+    context.run("unit_rows", file, defines, (height,), (width, height, expected, known, rows))
+    context.run("unit", file, defines, (1,), (height, rows, unit))
+    target, weight = context.empty((height, width, 5)), context.empty((height, width))
+    arguments = (
+        width, height, NUMBERS.offset, sample, light, expected, known, unit, target, weight
+    )  # fmt: skip
+    context.run("difference", file, defines, (-(-width // lanes), height), arguments)
+    return target, weight, unit
+
+
+def _arrange(run: Run, moments: Any, w: int) -> tuple[Grid, Grid]:
+    """The moments of the difference and its noise, and the brightness of the history."""
+    h, from_pitch = moments.shape[1:]
+    grid, level = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
+    defines = _defines(run) | {"WIDTH": 1}
+    pitch = grid.size[1]
+    arguments = h, w, pitch, from_pitch, moments, grid.planes, level.planes
+    run.context.run("arrange", "temporal/change.cl", defines, (pitch, h), arguments)
+    return grid, level
+
+
+def _judge(
+    run: Run, fit: Level, level: Grid, evidence: Any, caution: float
+) -> tuple[Any, Any, Any]:
+    """The models of what is signal, `(Q + 1, 3, h, pitch)`, the noise that the history takes on,
+    `(1, 1, h, pitch)`, and the evidence for the next frame."""
+    h, w, pitch = fit.models.sizes
+    planes, rows, after = run.grid(PLANES, h, w), run.grid(PLANES, h, w), run.grid(2, h, w)
+    model = run.context.empty((run.guides + 1, 3, h, pitch))
+    wrong = run.context.empty((1, 1, h, pitch))
+    features, moments, models = fit.features.planes, fit.moments.planes, fit.models.planes
+
+    def launch(name: str, *arguments: Any) -> None:
+        run.launch(name, "temporal/change.cl", rows, (h, pitch, *arguments), **_defines(run))
+
+    scale, sigma = run.numbers.guide_scale, run.numbers.sigma
+    launch("measure", DIM, scale, moments, features, models, level.planes, planes.planes)
+    launch("change_rows", sigma, features, planes.planes, rows.planes)
+    launch(
+        "judge", sigma, caution, NEWEST, FOLLOWED, NOVELTY, features, moments, rows.planes, models,
+        evidence, after.planes, model, wrong,
+    )  # fmt: skip
+    return model, wrong, after.planes
+
+
+def _defines(run: Run) -> dict[str, Any]:
+    planes = {"FEATURES": run.guides, "FEATURE_PLANES": max(run.guides, 1)}
+    return {"Q": run.guides, "C": 3, "REACH": REACH, **planes, **brightness_defines(3)}

@@ -1,0 +1,68 @@
+// Averages of the previous frame where its pixels are now: host side in jflnr/opencl/temporal.py, twin
+// in jflnr/temporal/reproject.py.
+
+#include "vectors.h"
+#include "sizes.h"
+#include "images.h"
+#include "bmfr/taps.h"
+#include "temporal/surface.h"
+
+// What an average holds there: its mean and its number of samples.
+INLINE real move(
+    global const float *mean, global const float *samples, const Taps *taps, long pixel,
+    global float *moved_mean, global float *moved_samples, real *found)
+{
+#pragma unroll
+    for (int c = 0; c < 3; ++c) found[c] = gather(mean, 3, c, taps);
+    write_pixels(moved_mean + pixel * 3, found, 0, WIDTH - 1);
+    const real count = gather(samples, 1, 0, taps);
+    WRITE(count, moved_samples + pixel);
+    return count;
+}
+
+// Global size (W / WIDTH, H). Means, normals and positions (H, W, 3), motion (H, W, 2), all others
+// (H, W). surface: above 0 where samples count. expected: brightness of the image there. known: 1
+// where samples count and there is a history, else 0.
+kernel void reproject(
+    int width, int height, float off_plane, float same_normal, global const float *surface,
+    global const float *motion, global const float *normal, global const float *depth,
+    global const float *position, global const float *before_normal,
+    global const float *before_depth, global const float *before_position,
+    global const float *light, global const float *light_samples, global const float *image,
+    global const float *image_samples, global float *moved_light, global float *moved_light_samples,
+    global float *moved_image, global float *moved_image_samples, global float *expected,
+    global float *known)
+{
+    const int x = FIRST_PIXEL(width), y = get_global_id(1);
+    if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
+    const long pixel = (long)y * width + x;
+    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
+    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
+    Surface here;
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+        here.normal[c] = OWN(normal, 3, c);
+        here.position[c] = OWN(position, 3, c);
+    }
+    here.depth = READ(depth + pixel);
+    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
+    const real tolerance = (off_plane + moved) * here.depth;
+#pragma unroll
+    for (int i = 0; i < 4; ++i) {
+        const Surface there =
+            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
+        const mask accept = alike(here, there, tolerance, same_normal);
+        taps.weight[i] = accept ? taps.weight[i] : (real)0;
+    }
+    normalise(&taps);
+
+    real found[3], brightness = 0;
+    const real count =
+        move(light, light_samples, &taps, pixel, moved_light, moved_light_samples, found);
+    move(image, image_samples, &taps, pixel, moved_image, moved_image_samples, found);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) brightness += BRIGHTNESS(c) * found[c];
+    WRITE(brightness, expected + pixel);
+    const mask counts = (count > 0) & (READ(surface + pixel) > 0);
+    WRITE(counts ? (real)1 : (real)0, known + pixel);
+}
