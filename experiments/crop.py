@@ -64,6 +64,7 @@ def _cut(rows: Rows, low: list[int]) -> Frame:
     """Rows and columns from `low` on, with a margin all around."""
     top, left = low
     bottom, right = (first + SIDE + 2 * MARGIN for first in low)
+    bottom = min(bottom, rows.height)
     bands = [
         jax.tree.map(lambda a: a[:, left:right], rows.read(row, min(row + BAND, bottom)))
         for row in range(top, bottom, BAND)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,8 @@ def names() -> dict[str, list[str]]:
 
 def write(path: Path, height: int, width: int, first: int = 0) -> None:
     """A frame of any size with the layers `PARTS`, as half; another one for each `first`."""
-    frames = [layers(jflnr.read_frame(found)) for found in data.frames("train", "val", "test")]
-    rows, columns, _ = frames[0].shape
+    frames = data.frames("train", "val", "test")
+    rows, columns, _ = layers(frames[0]).shape
     channels = [channel for group in names().values() for channel in group]
     with writing(path, (height, width), channels, kind="half") as append:
         for band, top in enumerate(range(0, height, rows)):
@@ -31,14 +32,16 @@ def write(path: Path, height: int, width: int, first: int = 0) -> None:
             append({name: strip[..., i] for i, name in enumerate(channels)})
 
 
-def strip_of(frames: list[np.ndarray], band: int, count: int, first: int) -> np.ndarray:
+def strip_of(frames: list[Path], band: int, count: int, first: int) -> np.ndarray:
     """`count` frames in a row, every other one mirrored; each band begins with another frame."""
     numbers = [(first + 5 * band + i) % len(frames) for i in range(count)]
-    chosen = [frames[k][:, :: -1 if i % 2 else 1] for i, k in enumerate(numbers)]
+    chosen = [layers(frames[k])[:, :: -1 if i % 2 else 1] for i, k in enumerate(numbers)]
     return np.concatenate(chosen, axis=1)[:: -1 if band % 2 else 1]
 
 
-def layers(frame: jflnr.Frame) -> np.ndarray:
+@functools.cache
+def layers(path: Path) -> np.ndarray:
     """The layers `PARTS` of a frame side by side, `(H, W, 12)` float16."""
+    frame = jflnr.read_frame(path)
     images = [getattr(frame, part) for part in PARTS]
     return np.concatenate(images, axis=-1).astype(np.float16)
