@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,12 +39,15 @@ class History(NamedTuple):
 
 def read(path: Path) -> History:
     """The history in a file. Raises `OSError` and, if it is no such file, `ValueError`."""
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            about = json.loads(str(stored[FORMAT]))
-            arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile):
-        raise ValueError(f"{path} is not a history that --history wrote, or is damaged") from None
+    with path.open("rb") as file:
+        try:
+            with np.load(file, allow_pickle=False) as stored:
+                about = json.loads(str(stored[FORMAT]))
+                arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
+        except Exception:  # damaged archives fail in many ways, some undocumented
+            raise ValueError(
+                f"{path} is not a history that --history wrote, or is damaged"
+            ) from None
     return History(path, about, arrays)
 
 
