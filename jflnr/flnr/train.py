@@ -81,7 +81,7 @@ def train(
     if not crops:
         raise ValueError("crops is empty: no frame shows enough surface and light")
     params = initial or regression.init(jax.random.key(settings.seed), settings.widths)
-    solver = Adam(_batch_loss(settings), _rate(settings))
+    solver = Adam(_batch_loss(settings), rate_of(settings))
     state = solver.init_state(params)
     score = Validation(validation)
     history = [Progress(0, float("nan"), score(params))]
@@ -111,7 +111,7 @@ def train(
     return Result(jax.tree.map(np.asarray, best), top, history)
 
 
-def _rate(settings: Settings) -> Callable[[jax.Array], jax.Array]:
+def rate_of(settings: Settings) -> Callable[[jax.Array], jax.Array]:
     """A slow start, then steps that shrink with the root of their number; no end is needed."""
     return lambda t: settings.rate * jnp.minimum(1, (t + 1) / 100) / jnp.sqrt(1 + t / 2000)
 
