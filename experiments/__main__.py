@@ -36,6 +36,7 @@ NAMES = (
     "error_map",
     "criterion",
     "parsimony",
+    "predictions",
     "large",
     "throughput",
     "accumulated",

@@ -9,16 +9,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.ndimage import correlate1d
-from scipy.stats import spearmanr
 
 import jflnr
-from experiments import criteria, data, plots, results, resume
+from experiments import ceiling, criteria, data, plots, results, resume
+from experiments.ceiling import BLOCK, SIDES, rank
 from jflnr.flr.blur import gaussian_taps
 from jflnr.flr.level import brightness
 from jflnr.flr.moments import centre, collect, index_xy
 from jflnr.inputs import flr_images
-from jflnr.selection.blocks import BLOCK
-from jflnr.selection.method import denoise_on_blocks
 
 NAME = "criterion"
 QUESTION = "Which criterion tells best, without a reference, how wrong a local model is?"
@@ -31,8 +29,6 @@ RIDGE = 1e-4
 # Samples per pixel of the independent stream that half buffers are tested on.
 SECOND = 4
 CRITERIA = ("GCV", "Mallows", "leave block out", "half buffers")
-# Sides in pixels of the squares over which errors are averaged before they are ranked.
-SIDES = (8, 16, 32, 64)
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -40,7 +36,10 @@ def run(quick: bool) -> dict[str, Any]:
     paths = data.frames("val", "test")[: 1 if quick else None]
     names = [str(path) for path in paths]
     tag = "-quick" * quick
-    return {"rows": resume.rows(f"{NAME}{tag}", names, lambda name: one(Path(name)))}
+    rows = resume.rows(f"{NAME}{tag}", names, lambda name: one(Path(name)))
+    several = [] if quick else [str(path) for path in ceiling.with_draws()]
+    ceilings = resume.rows(f"{NAME}-ceiling", several, lambda name: ceiling.one(Path(name)))
+    return {"rows": rows, "ceilings": ceilings}
 
 
 def one(path: Path) -> dict[str, Any]:
@@ -170,29 +169,10 @@ def _blur(part: np.ndarray, taps: np.ndarray) -> np.ndarray:
     return part
 
 
-def rank(true: np.ndarray, told: np.ndarray, used: np.ndarray, side: int) -> float:
-    """Spearman's correlation over squares of `side` pixels that are wholly in use."""
-    true, told, whole = (_pool(image, side // BLOCK) for image in (true, told, used * 1.0))
-    return float(spearmanr(true[whole > 0.99], told[whole > 0.99]).statistic)
-
-
-def _pool(image: np.ndarray, by: int) -> np.ndarray:
-    h, w = (size // by for size in image.shape)
-    return image[: h * by, : w * by].reshape(h, by, w, by).mean((1, 3))
-
-
 def expected_error(path: Path) -> dict[str, float]:
     """The same correlation for the error that the form of blocks of 8 tells of its own result."""
-    frame = jflnr.read_frame(path)
-    image, models = denoise_on_blocks(frame)
-    weights = np.array([0.2126, 0.7152, 0.0722])
-    off = ((np.asarray(image) - np.asarray(frame.reference)) @ weights) ** 2
-    error = np.asarray(models.error, np.float64)
-    inside = np.ones_like(off) if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
-    height, width = (size // BLOCK * BLOCK for size in off.shape)
-    true, used = (_pool(a[:height, :width] * 1.0, BLOCK) for a in (off, inside))
-    error = error[: true.shape[0], : true.shape[1]]
-    return {str(side): rank(true, error, used > 0.99, side) for side in SIDES}
+    true, told, used = ceiling.true_and_told(jflnr.read_frame(path))
+    return {str(side): rank(true, told, used, side) for side in SIDES}
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
@@ -214,12 +194,20 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     errors |= {f"{name} error": name for name in CRITERIA}
     ranks = {"frame": "frame"} | {f"{n} {side}": f"{n}, {side}" for n in names for side in (8, 32)}
     text = results.table([*table, mean], errors) + "\n" + results.table([*table, mean], ranks)
+    highest: dict[str, float] = {}
+    if result["ceilings"]:
+        highest = means(result["ceilings"])
+        columns = {key: ", ".join(key.rsplit(" ", 1)) for key in result["ceilings"][0]}
+        text += "\n" + results.table([*result["ceilings"], {"frame": "mean"} | highest], columns)
     plots.write_text(folder / f"{NAME}.md", text)
     with plots.figure(folder / f"{NAME}.png", columns=2) as (left, right):
         for name, style in zip(names, ("o-", "s--", "^:", "v-.", "D-"), strict=True):
             left.plot(
                 SIDES, [mean.get(f"{name} {side}", np.nan) for side in SIDES], style, label=name
             )
+        if highest:
+            best = [highest[f"ceiling {side}"] for side in SIDES]
+            left.plot(SIDES, best, "k:", label="ceiling, training frames")
         left.axhline(0.8, color="grey", linewidth=1)
         left.set(
             xlabel="side of the squares, pixels", ylabel="rank correlation with the true error"

@@ -17,10 +17,11 @@ from experiments.resume import ROOT
 from experiments.timing import times
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
-from jflnr.frame import Frame
+from jflnr.frame import Array, Frame
 from jflnr.guides import layers
 from jflnr.metrics import measure
 from jflnr.selection.method import denoise_on_blocks, plan_of
+from jflnr.selection.plan import BLOCKS
 
 NAME = "parsimony"
 QUESTION = "Does method auto find the smallest model that is good enough, and what does it save?"
@@ -29,7 +30,8 @@ QUESTION = "Does method auto find the smallest model that is good enough, and wh
 FAMILIES = "*-[1-4]_100.exr"
 # BMFR's features of higher order (its Eq. 1), added to ours.
 POWERS = {"squares of depth": "depth", "squares of normals": "normal", "squares of ao": "ao"}
-COLOURS = {"train": "o", "val": "s", "test": "^", "simple": "D"}
+FIXED = tuple(name for name in jflnr.METHODS if name not in ("auto", "bmfr"))
+MARKERS = {"train": "o", "val": "s", "test": "^", "simple": "D"}
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -57,16 +59,32 @@ def _is_shared(path: Path) -> bool:
 
 
 def methods() -> list[Method]:
-    """Every method of jflnr, and the smallest form of auto by itself."""
-    found = [Method(name, "jflnr", jflnr.denoise, {"method": name}) for name in jflnr.METHODS]
-    return [*found, Method("blocks", "jflnr", lambda frame: denoise_on_blocks(frame)[0], {})]
+    """Every method of jflnr for single frames, and the forms of auto by themselves."""
+    names = [name for name in jflnr.METHODS if name != "bmfr"]
+    found = [Method(name, "jflnr", jflnr.denoise, {"method": name}) for name in names]
+    return [*found, *(Method(form, "jflnr", on_blocks, {"form": form}) for form in BLOCKS)]
+
+
+def on_blocks(frame: Frame, form: str) -> Array:
+    """One form of method auto by itself."""
+    return denoise_on_blocks(frame, form)[0]
+
+
+def tiled(frame: Frame, height: int = 1080, width: int = 1920) -> Frame:
+    """The frame beside and below itself, up to the size of a screen: for times only."""
+
+    def tile(layer: Array) -> np.ndarray:
+        h, w = layer.shape[:2]
+        return np.tile(layer, (-(-height // h), -(-width // w), 1))[:height, :width]
+
+    return jax.tree.map(tile, frame)
 
 
 def one(path: Path, quick: bool) -> dict[str, Any]:
-    """PSNR and milliseconds of all methods on one frame."""
+    """PSNR of all methods on one frame, and milliseconds at 1920 x 1080."""
     frame = jflnr.read_frame(path)
     plan = plan_of(frame)
-    ms = times(methods(), frame, quick)
+    ms = times(methods(), frame if quick else tiled(frame), quick)
     psnr = {method.name: measure(frame, method(frame))["psnr"] for method in methods()}
     return {
         "frame": data.label(path),
@@ -105,7 +123,7 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         names = list(mine[0]["psnr"])
         psnr = {n: float(np.mean([row["psnr"][n] for row in mine])) for n in names}
         ms = {n: float(np.mean([row["ms"][n] for row in mine])) for n in names}
-        fixed = [n for n in names if n != "auto"]
+        fixed = [n for n in names if n in FIXED]
         best = max(fixed, key=lambda n: psnr[n])
         oracle = float(np.mean([max(row["psnr"][n] for n in fixed) for row in mine]))
         found.append(
@@ -113,7 +131,7 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             | {f"{n} dB": psnr[n] for n in names}
             | {"oracle dB": oracle, "best": best, "loss": psnr[best] - psnr["auto"]}
             | {"time": ms["auto"] / ms[best], "per_flr": ms["auto"] / ms["flr"]}
-            | {"blocks_per_flr": ms["blocks"] / ms["flr"]}
+            | {f"{form} ms": ms[form] / ms["flr"] for form in BLOCKS}
         )
     return found
 
@@ -129,7 +147,7 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     columns = {"split": "split", "frames": "frames"} | {f"{n} dB": n for n in names}
     columns |= {"oracle dB": "best of each frame", "best": "best fixed", "loss": "auto loses, dB"}
     columns |= {"time": "time of auto / best fixed", "per_flr": "auto / flr"}
-    columns |= {"blocks_per_flr": "blocks / flr"}
+    columns |= {f"{form} ms": f"{form} / flr" for form in BLOCKS}
     tables = [results.table(summary(rows), columns)]
     each = [{**row, **row["psnr"], "kept": ", ".join(row["guides"])} for row in rows]
     tables.append(
@@ -148,9 +166,9 @@ def draw(result: dict[str, Any], folder: Path) -> None:
 
 
 def _regret(axis: Any, rows: list[dict[str, Any]]) -> None:
-    for split, marker in COLOURS.items():
+    for split, marker in MARKERS.items():
         mine = [row for row in rows if _split(row) == split]
-        fixed = [max((n for n in row["psnr"] if n != "auto"), key=row["psnr"].get) for row in mine]
+        fixed = [max(FIXED, key=row["psnr"].get) for row in mine]
         saved = [1 - r["ms"]["auto"] / r["ms"][n] for r, n in zip(mine, fixed, strict=True)]
         lost = [r["psnr"][n] - r["psnr"]["auto"] for r, n in zip(mine, fixed, strict=True)]
         if mine:
@@ -162,9 +180,9 @@ def _regret(axis: Any, rows: list[dict[str, Any]]) -> None:
 
 def _frontier(axis: Any, rows: list[dict[str, Any]]) -> None:
     mine = [row for row in rows if _split(row) == "test"] or rows
-    for name in mine[0]["psnr"]:
+    for name, marker in zip(mine[0]["psnr"], "osv^D*<>P", strict=True):
         x = float(np.mean([row["ms"][name] / row["ms"]["flr"] for row in mine]))
         y = float(np.mean([row["psnr"][name] for row in mine]))
-        axis.plot([x], [y], "D" if name == "auto" else "o")
-        axis.annotate(name, (x, y), textcoords="offset points", xytext=(6, -3))
+        axis.plot([x], [y], marker, label=name, markersize=11 if name == "auto" else 7, alpha=0.8)
     axis.set(xlabel="time, in that of plain FLR", ylabel="PSNR, dB, mean of test", xlim=(0, None))
+    axis.legend(fontsize=8, loc="lower right")

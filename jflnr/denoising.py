@@ -80,8 +80,9 @@ def denoise(
                 "one piece; flr and flr-adaptive also run on opencl and in tiles"
             )
         from jflnr.selection.method import select_inputs
+        from jflnr.selection.plan import Limits
 
-        return select_inputs(inputs, names, keep_energy=keep_energy)[1]
+        return select_inputs(inputs, names, Limits(), keep_energy)[1]
     if method in flnr.METHODS:
         if block != BLOCK:
             raise ValueError(f"method {method} works with block {BLOCK} only; got {block}")

@@ -121,10 +121,11 @@ def collect(
     def strip(arrays: tuple[jax.Array, Guides, jax.Array | None]) -> jax.Array:
         return _strip_moments(*arrays, shift=shift, block=block, brightness=brightness)
 
-    # Three rows of blocks stay in the cache while their products are formed, and keep cores busy;
-    # where they do not divide the frame, one: a second program for the rest would compile longer.
+    # 24 rows of pixels stay in the cache while their products are formed, and keep cores busy;
+    # where they do not divide the frame, fewer: a second program for the rest would compile longer.
     strips = jax.tree.map(lambda a: into_strips(a, block), inputs)
-    moments = lax.map(strip, strips, batch_size=1 if rows % 3 else 3)
+    together = max(k for k in range(1, max(24 // block, 1) + 1) if rows % k == 0)
+    moments = lax.map(strip, strips, batch_size=together)
     if target.shape[0] % block:
         rest = strip(jax.tree.map(lambda a: a[rows * block :], inputs))
         moments = jnp.concatenate([moments, rest[None]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,10 +15,17 @@ from jflnr.flnr.features import GUIDES
 from jflnr.flr.adaptive import light_of
 from jflnr.flr.apply import apply
 from jflnr.flr.energy import rescale
+from jflnr.flr.floor import with_own_light
 from jflnr.frame import Array, Frame
-from jflnr.inputs import flr_images, prepare
+from jflnr.inputs import adaptive_images, flr_images, prepare
 from jflnr.selection import plan as plans
-from jflnr.selection.blocks import BLOCK, Collected, Models, collect_frame, fit, hold
+from jflnr.selection.blocks import SETTINGS, Models, Unfinished, fit, refine
+from jflnr.selection.collected import Collected, collect_frame, hold
+from jflnr.selection.glance import is_simple
+
+# Sides in pixels of the blocks that a form collects, and of those that its image is made from.
+COLLECTED = {"blocks-16": 8, "blocks-8": 4, "blocks-4": 4}
+EVALUATED = {"blocks-16": 8, "blocks-8": 8, "blocks-4": 4}
 
 
 def select(
@@ -40,97 +48,127 @@ def select(
         if value is not None and not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value}; it must be a positive number")
     names, inputs = prepare(frame, guides)
-    return select_inputs(inputs, names, budget_ms, target_db, plans.seconds_per_pixel())
+    limits = plans.Limits(budget_ms, target_db, plans.seconds_per_pixel())
+    return select_inputs(inputs, names, limits)
 
 
 def select_inputs(
     frame: Frame,
     names: tuple[str, ...],
-    budget_ms: float | None = None,
-    target_db: float | None = None,
-    seconds: float | None = None,
+    limits: plans.Limits,
     keep_energy: bool = False,
 ) -> tuple[plans.Plan, Array]:
-    """`select` of what `prepare` returned. seconds: per pixel, of plain FLR on this device."""
-    plan, collected, models = _planned(frame, names, seconds, budget_ms, target_db)
-    if plan.form != plans.BLOCKS:
+    """`select` of what `prepare` returned."""
+    plan, fitted = _planned(frame, names, limits)
+    if plan.form not in plans.BLOCKS:
         from jflnr.denoising import denoise
 
         return plan, denoise(frame, plan.form, guides=names, keep_energy=keep_energy)
-    return plan, _apply(frame, collected, models, names, plan.guides, keep_energy)
-
-
-def _planned(
-    frame: Frame,
-    names: tuple[str, ...],
-    seconds: float | None,
-    budget_ms: float | None = None,
-    target_db: float | None = None,
-) -> tuple[plans.Plan, Collected, Models]:
-    """The plan, and the moments and models of the smallest form, which it rests on."""
-    if frame.indirect.shape[:2] != frame.normal.shape[:2]:
-        raise ValueError("method auto needs frame.indirect at the size of the guides")
-    collected = _collect(frame, names)
-    models = fit(collected, _groups(frame, names))
-    look = plans.look_at(models, collected.moments[0])
-    network = sorted(names) == sorted(GUIDES) and frame.indirect.shape[-1] == 3
-    forms = plans.FORMS if network else plans.FORMS[:-1]
-    limits = seconds, budget_ms, target_db
-    plan = plans.plan(look, names, np.asarray(models.order), frame.depth.size, *limits, forms)
-    if plan.form == plans.BLOCKS:
-        plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
-    return plan, collected, models
+    if COLLECTED[plan.form] != fitted.block:
+        fitted = _fitted(frame, names, plan.form)
+    models = _finished(fitted, plan.form)
+    plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
+    used = tuple(names.index(name) for name in plan.guides)
+    return plan, _image(fitted, models, plan.form, used, keep_energy)
 
 
 def plan_of(frame: Frame, guides: Sequence[str] | None = None) -> plans.Plan:
     """The plan that method `auto` follows for a frame, with the time predicted of it."""
     names, inputs = prepare(frame, guides)
-    return _planned(inputs, names, plans.seconds_per_pixel())[0]
+    return _planned(inputs, names, plans.Limits(seconds=plans.seconds_per_pixel()))[0]
 
 
-def denoise_on_blocks(frame: Frame, guides: Sequence[str] | None = None) -> tuple[Array, Models]:
-    """The smallest form by itself, with all guides: its light, and the models.
+def denoise_on_blocks(
+    frame: Frame, form: str, guides: Sequence[str] | None = None
+) -> tuple[Array, Models]:
+    """One of the forms of `BLOCKS` by itself, with all guides: its light, and the models.
 
-    frame, guides: as of `denoise`.
+    frame, guides: as of `denoise`. The errors of the models are in the unit of the light.
     """
     names, inputs = prepare(frame, guides)
-    collected = _collect(inputs, names)
-    models = fit(collected, _groups(inputs, names))
-    image = _apply(inputs, collected, models, names, names, False)
-    return image, models._replace(error=models.error * collected.unit**2)
+    fitted = _fitted(inputs, names, form)
+    models = _finished(fitted, form)
+    image = _image(fitted, models, form, tuple(range(len(names))), False)
+    return image, models._replace(error=models.error * fitted.collected.unit**2)
 
 
-@functools.partial(jax.jit, static_argnames="names")
-def _collect(frame: Frame, names: tuple[str, ...]) -> Collected:
-    images = flr_images(frame, names)
-    return collect_frame(images["target"], images["guides"], images["weight"])
+@dataclasses.dataclass(frozen=True)
+class Fitted:
+    """A frame as the regressions take it, its moments on blocks of so many pixels, and models."""
+
+    images: dict[str, Any]
+    collected: Collected
+    models: Models
+    unfinished: Unfinished
+    groups: tuple[int, ...]
+    block: int
 
 
-@functools.partial(jax.jit, static_argnames=("names", "used", "keep_energy"))
+def _planned(
+    frame: Frame, names: tuple[str, ...], limits: plans.Limits
+) -> tuple[plans.Plan, Fitted]:
+    """The plan, and the models of the form that it rests on."""
+    if frame.indirect.shape[:2] != frame.normal.shape[:2]:
+        raise ValueError("method auto needs frame.indirect at the size of the guides")
+    pixels = frame.depth.size
+    first = plans.first(is_simple(frame), limits, pixels)
+    fitted = _fitted(frame, names, first)
+    look = plans.look_at(fitted.models)
+    network = sorted(names) == sorted(GUIDES) and frame.indirect.shape[-1] == 3
+    order = np.asarray(fitted.models.order)
+    return plans.plan(first, look, names, order, pixels, limits, network), fitted
+
+
+def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
+    """The models of the form that `form` begins with."""
+    block = COLLECTED[form]
+    images, collected = _collect(frame, names, block)
+    groups = tuple(layer.shape[-1] for layer in images["guides"])
+    # What a shift does on blocks of 8 pixels, whole models do in the forms with smaller ones.
+    shifted = form == "blocks-16"
+    models, unfinished = fit(collected, groups, block, shifted)
+    return Fitted(images, collected, models, unfinished, groups, block)
+
+
+def _finished(fitted: Fitted, form: str) -> Models:
+    """The models of a form: those it began with, or whole ones of the blocks collected."""
+    if form == plans.start_of(form):
+        return fitted.models
+    return refine(fitted.collected, fitted.unfinished, fitted.groups, fitted.block)
+
+
+def _image(
+    fitted: Fitted, models: Models, form: str, used: tuple[int, ...], keep_energy: bool
+) -> Array:
+    shift, unit = fitted.collected.shift, fitted.collected.unit
+    return _apply(fitted.images, models, shift, unit, used, EVALUATED[form], keep_energy)
+
+
+@functools.partial(jax.jit, static_argnames=("names", "block"))
+def _collect(frame: Frame, names: tuple[str, ...], block: int) -> tuple[dict[str, Any], Collected]:
+    # Models of large blocks hardly follow ambient occlusion, let alone its noise.
+    images = (adaptive_images if block < 8 else flr_images)(frame, names)
+    collected = collect_frame(images["target"], images["guides"], block, images["weight"])
+    return images, collected
+
+
+@functools.partial(jax.jit, static_argnames=("used", "block", "keep_energy"))
 def _apply(
-    frame: Frame,
-    collected: Collected,
+    images: dict[str, Any],
     models: Models,
-    names: tuple[str, ...],
-    used: tuple[str, ...],
+    shift: jax.Array,
+    unit: jax.Array,
+    used: tuple[int, ...],
+    block: int,
     keep_energy: bool,
 ) -> jax.Array:
-    """Evaluate the models at every pixel, reading the guides `used` out of `names` only."""
-    images, groups = flr_images(frame, used), _groups(frame, names)
-    starts = np.cumsum(groups) - groups
-    kept = [
-        start + i
-        for name, start, size in zip(names, starts, groups, strict=True)
-        if name in used
-        for i in range(size)
-    ]
-    coefficients = hold(models.coefficients, collected, kept)
-    none = jnp.zeros((*frame.normal.shape[:2], 0), coefficients.dtype)
-    guides, shift = (*images["guides"], none), collected.shift[np.array(kept, int)]
-    image = apply(coefficients, guides, shift, BLOCK) * collected.unit
-    return rescale(image, light_of(images["target"]), images["weight"]) if keep_energy else image
-
-
-def _groups(frame: Frame, names: Sequence[str]) -> tuple[int, ...]:
-    """The channels of each guide, which enter a model together."""
-    return tuple(getattr(frame, name).shape[-1] for name in names)
+    """Evaluate the models at every pixel, reading the guides `used` only."""
+    target, layers = images["target"], images["guides"]
+    ends = np.cumsum([layer.shape[-1] for layer in layers])
+    kept = [int(q) for n in used for q in range(ends[n] - layers[n].shape[-1], ends[n])]
+    held = hold(models.coefficients, models.means, kept)
+    held = with_own_light(held, models.means[np.array([0, *(q + 1 for q in kept)])])
+    none = jnp.zeros((*target.shape[:2], 0), held.dtype)
+    guides = (*(layers[n] for n in used), none)
+    image = apply(held, guides, shift[np.array(kept, int)], block, SETTINGS.numbers().floor) * unit
+    return rescale(image, light_of(target), images["weight"]) if keep_energy else image

@@ -14,27 +14,35 @@ import numpy as np
 
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
-from jflnr.frame import Array
 from jflnr.selection.blocks import Models
 
 # How a picture is shown where its error is measured (`jflnr.metrics`, which no denoiser imports).
 MEAN_BRIGHTNESS, GAMMA = 0.35, 2.2
 
-# From the smallest to the largest; the first is `blocks.py`.
-BLOCKS = "blocks"
-FORMS = (BLOCKS, "flr-adaptive", "flnr")
+# From the smallest to the largest. Those of `blocks.py` are named after their whole models.
+BLOCKS = ("blocks-16", "blocks-8", "blocks-4")
+FORMS = (*BLOCKS, "flnr")
 # Time per pixel, in that of plain FLR with five guides.
-COSTS = dict(zip(FORMS, (1.4, 2.5, 2.9), strict=True))
-# What looking at a frame has cost when a larger form is taken after all.
-LOOK = 0.9
+COSTS = dict(zip(FORMS, (0.8, 1.4, 2.0, 4.4), strict=True))
+# What looking at a frame by a form has cost when a larger one is taken after all that does not
+# go on from it.
+LOOKS = {"blocks-16": 0.5, "blocks-8": 1.1}
 # Decibels that a form must bring for each further FLR of time.
-PRICE = 0.3
+PRICE = 0.15
 # A guide is read at every pixel if inside blocks it does more than this share of the squared error.
-WORTH = 1e-3
+WORTH = 1e-4
+
+
+class Limits(NamedTuple):
+    """What the user asks for, and the time per pixel of plain FLR if it was measured."""
+
+    budget_ms: float | None = None
+    target_db: float | None = None
+    seconds: float | None = None
 
 
 class Look(NamedTuple):
-    """A frame as the smallest form sees it; the arguments of the predictions.
+    """A frame as the form that is tried first sees it; the arguments of the predictions.
 
     decibels: PSNR that the expected error leaves. share: of the finest step that is signal.
     noise: logarithm of the expected relative error, mean over the blocks. order: groups of guides
@@ -48,12 +56,20 @@ class Look(NamedTuple):
     width: float
 
 
-# Decibels = these times (1, decibels, share, noise, order, width): fitted on 97 training
-# frames at 1 and 4 samples per pixel (docs/select.md).
+# By the form that looks, then by form: decibels = these times (1, decibels, share, noise, order,
+# width), fitted by the experiment `predictions`.
 PREDICTIONS = {
-    "blocks": (11.98, 0.3627, -3.287, -6.12, -2.359, 0.9175),
-    "flr-adaptive": (12.48, 0.3251, -1.754, -6.418, -2.199, 0.7396),
-    "flnr": (13.4, 0.2942, -1.867, -6.534, -2.246, 0.7748),
+    "blocks-16": {
+        "blocks-16": (15.36, 0.06295, -3.96, -0.426, 1.597, 2.698),
+        "blocks-8": (14.81, 0.06346, -3.38, -0.4003, 1.64, 3.086),
+        "blocks-4": (14.67, 0.06736, -2.572, -0.4115, 1.505, 3.295),
+        "flnr": (16.02, 0.05307, -2.947, -0.3786, 1.335, 3.292),
+    },
+    "blocks-8": {
+        "blocks-8": (15.35, 0.06418, -0.2432, -0.3683, 1.854, 2.181),
+        "blocks-4": (15.2, 0.06822, 0.498, -0.384, 1.708, 2.343),
+        "flnr": (16.02, 0.05332, -0.06263, -0.3377, 1.84, 2.306),
+    },
 }
 
 
@@ -63,8 +79,8 @@ class Plan:
 
     form: one of FORMS. guides: those used. decibels: predicted PSNR of every form. cost: predicted
     time of every form in that of plain FLR. milliseconds: on this device, of the chosen form; None
-    unless it was asked for. order: `(h, w)`, how many of the `groups` of guides are in use, block
-    by block.
+    unless it was asked for. order: `(h, w)`, how many of the `groups` of guides are in use, by
+    blocks of 8 pixels.
     """
 
     form: str
@@ -94,16 +110,13 @@ class Plan:
         ]
 
 
-def look_at(models: Models, count: Array) -> Look:
-    """Numbers of one frame from the models of its blocks.
-
-    count: `(h, w)`, how much of each block can be used.
-    """
+def look_at(models: Models) -> Look:
+    """Numbers of one frame from the models of its blocks."""
     level, error, share, order, width = (
         np.asarray(planes, np.float64)
         for planes in (models.level, models.error, models.share, models.order, models.width)
     )
-    used = np.asarray(count) > 0
+    used = np.asarray(models.usable) > 0
     used = used if used.any() else np.ones_like(used)
     mean = float(models.mean)
     scale = MEAN_BRIGHTNESS / mean
@@ -120,10 +133,10 @@ def look_at(models: Models, count: Array) -> Look:
     )
 
 
-def predict(look: Look) -> dict[str, float]:
-    """PSNR that every form is expected to reach."""
-    values = np.array([1, look.decibels, look.share, look.noise, look.order, look.width])
-    return {form: float(values @ np.array(weights)) for form, weights in PREDICTIONS.items()}
+def predict(look: Look, first: str) -> dict[str, float]:
+    """PSNR that the form which looked and those larger are expected to reach."""
+    values = np.array([1, *look])
+    return {form: float(values @ np.array(w)) for form, w in PREDICTIONS[first].items()}
 
 
 def worth_reading(models: Models, names: Sequence[str]) -> tuple[str, ...]:
@@ -133,25 +146,56 @@ def worth_reading(models: Models, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(n for n, gain in zip(names, gains, strict=True) if gain > WORTH * expected)
 
 
+def start_of(form: str) -> str:
+    """The form that this one goes on from, or itself: both come from the same moments."""
+    return "blocks-8" if form == "blocks-4" else form
+
+
+def first(simple: bool, limits: Limits, pixels: int) -> str:
+    """The form to begin with. simple: whether the frame looked so at a glance.
+
+    With a budget that leaves time for more, even a simple frame gets more.
+    """
+    if limits.budget_ms is not None and limits.seconds is not None:
+        simple = 1e3 * limits.seconds * pixels * COSTS["blocks-8"] > limits.budget_ms
+    return "blocks-16" if simple else "blocks-8"
+
+
 def plan(
+    first: str,
     look: Look,
     names: tuple[str, ...],
     order: np.ndarray,
     pixels: int,
-    seconds: float | None,
-    budget_ms: float | None,
-    target_db: float | None,
-    forms: Sequence[str] = FORMS,
+    limits: Limits,
+    network: bool,
 ) -> Plan:
-    """The plan for a frame. seconds: per pixel of plain FLR, or None if no time is asked for.
+    """The plan for a frame that the form `first` has looked at.
 
-    order: `(h, w)`, of the blocks that the look was taken at. forms: those that can be used.
+    order: `(h, w)`, of the blocks of that form. network: whether flnr can be used.
     """
-    decibels = {form: value for form, value in predict(look).items() if form in forms}
-    cost = {form: COSTS[form] + (0 if form == BLOCKS else LOOK) for form in forms}
-    ms = None if seconds is None else {form: 1e3 * seconds * pixels * c for form, c in cost.items()}
-    form = choose(decibels, cost, ms, budget_ms, target_db)
-    return Plan(form, names, decibels, cost, None if ms is None else ms[form], order, len(names))
+    decibels = predict(look, first)
+    if not network:
+        del decibels["flnr"]
+    cost = {
+        form: COSTS[form] + (0 if start_of(form) == first else LOOKS[first]) for form in decibels
+    }
+    ms = None
+    if limits.seconds is not None:
+        ms = {form: 1e3 * limits.seconds * pixels * c for form, c in cost.items()}
+    form = choose(_open(first, decibels, limits), cost, ms, limits.budget_ms, limits.target_db)
+    time = None if ms is None else ms[form]
+    return Plan(form, names, decibels, cost, time, order, len(names))
+
+
+def _open(first: str, decibels: Mapping[str, float], limits: Limits) -> dict[str, float]:
+    """The forms that may be taken. With no other wish than the smallest model that is enough, a
+    simple frame stays with the form for such, and none goes on to the network: which frames gain by
+    it cannot be predicted (docs/select.md)."""
+    if limits.target_db is not None or limits.budget_ms is not None:
+        return dict(decibels)
+    small = BLOCKS[:1] if first == FORMS[0] else BLOCKS[1:]
+    return {form: value for form, value in decibels.items() if form in small}
 
 
 def choose(

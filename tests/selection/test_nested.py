@@ -6,8 +6,9 @@ import pytest
 
 from jflnr.flr.level import brightness
 from jflnr.flr.moments import collect
-from jflnr.selection.blocks import Collected, squared_residual
+from jflnr.selection.collected import Collected
 from jflnr.selection.nested import fit_orders
+from jflnr.selection.weights import squared_residual
 
 GROUPS = (3, 1)
 WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
