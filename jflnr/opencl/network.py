@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 import jax
+import numpy as np
 
 from jflnr.flnr import features, regression, unet
 from jflnr.flr.adaptive import LEVELS
@@ -13,10 +14,11 @@ from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.arguments import channel_count, check_regression
 from jflnr.opencl import network_features, network_unet
 from jflnr.opencl.adaptive import fit_pilot
-from jflnr.opencl.apply import apply
+from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import to_image, to_layers, to_output, to_weight
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.energy import frame_mean, rescale, restore
+from jflnr.opencl.floor import own_light
 from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import fit_level, new_models
 from jflnr.opencl.merge import merge, signal_share
@@ -62,9 +64,12 @@ def flnr(
     weight = to_weight(context, weight)
     image = context.empty(target.shape) if keep_energy else output
     frame = prepare(context, *images, weight)
-    h, w, _ = frame.steps[-1].fine.models.sizes
-    model = finish(params, frame)
-    apply(context, model, images[1], frame.run.shift, BLOCK, (h, w, model.shape[3]), image)
+    models, own = finish(params, frame)
+    # They are scaled already.
+    rate, brightness = context.array(np.zeros(1, np.float32)), frame.restored[1]
+    restored = Restored(rate, brightness, own, frame.run.numbers.floor)
+    shift, sizes = frame.run.shift, models.sizes
+    apply(context, models.planes, images[1], shift, BLOCK, sizes, image, restored)
     if keep_energy:
         rescale(context, image, images[0], weight, output)
     return context.finish(output, result)
@@ -95,17 +100,18 @@ def prepare(context: Context, target: Any, guides: tuple[Any, ...], weight: Any 
     return Prepared(run, steps, network_features.of_steps(run, steps, merged), restored)
 
 
-def finish(params: unet.Params, frame: Prepared) -> Any:
-    """Merge the levels and correct the light as the network says: `(Q + 1, C, h, pitch)`.
+def finish(params: unet.Params, frame: Prepared) -> tuple[Grid, Grid]:
+    """Merge the levels and correct the light as the network says.
 
-    Kernels in kernels_cl/network/steer.cl.
+    Returns the models of the finest grid, and the light that each gives its block.
     """
     run, steps, x, restored = frame
     said = network_unet.apply(run.context, params, x)
     merged = steps[0].coarse.models
     for step, outputs, channel in zip(steps[:-1], said[::-1], (0, said[0].count - 1), strict=True):
         merged = _steer(run, step, outputs, channel, merged)
-    return _finish(run, steps[-1], said[0], merged, restored)
+    models = _finish(run, steps[-1], said[0], merged, restored)
+    return models, own_light(run, models, steps[-1].fine.moments)
 
 
 def _fit_levels(run: Run, moments: Grid) -> tuple[list[Step], Grid]:
@@ -134,16 +140,16 @@ def _steer(run: Run, step: Step, said: Maps, channel: int, merged: Grid) -> Grid
     return finer
 
 
-def _finish(run: Run, step: Step, said: Maps, merged: Grid, restored: tuple[Any, Any]) -> Any:
+def _finish(run: Run, step: Step, said: Maps, merged: Grid, restored: tuple[Any, Any]) -> Grid:
     rate, brightness = restored
-    h, _, pitch = step.fine.models.sizes
-    model = run.context.empty((run.guides + 1, run.channels, h, pitch))
+    h, w, pitch = step.fine.models.sizes
+    models = new_models(run, h, w)
     arguments = (
         h, pitch, *merged.sizes, said.pitch, brightness.shape[1], said.values,
-        *_models(step, merged), run.mean, rate, brightness, model,
+        *_models(step, merged), run.mean, rate, brightness, models.planes,
     )  # fmt: skip
-    run.launch("finish", "network/steer.cl", step.fine.models, arguments, **_defines(said))
-    return model
+    run.launch("finish", "network/steer.cl", models, arguments, **_defines(said))
+    return models
 
 
 def _models(step: Step, merged: Grid) -> tuple[Any, ...]:

@@ -103,12 +103,12 @@ def convolve(
     weights = np.ascontiguousarray(kernel.transpose(3, 0, 2, 1, 4))
     width = context.width()
     defines = {
-        "WIDTH": width, "SIDE": side, "STRIDE": stride, "INPUTS": inputs, "OUTPUTS": outputs,
-        "TOGETHER": together, "VECTORS": _vectors(context),
+        "WIDTH": width, "SIDE": side, "STRIDE": stride, "TOGETHER": together,
+        "VECTORS": _vectors(context),
     } | ({"LEAKY": 1} if leaky else {})  # fmt: skip
     arguments = (
-        to.h, to.w, to.pitch, x.pitch, x.count, first, to.count, to_first, context.array(weights),
-        context.array(np.pad(bias, (0, missing))), x.values, to.values,
+        to.h, to.w, to.pitch, x.pitch, x.count, first, inputs, to.count, to_first, outputs,
+        context.array(weights), context.array(np.pad(bias, (0, missing))), x.values, to.values,
     )  # fmt: skip
     size = (to.pitch - MARGIN) // (_vectors(context) * width), groups, to.h + 2
     moved = 4 * (x.h * x.w * inputs + to.h * to.w * outputs + weights.size)

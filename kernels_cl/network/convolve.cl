@@ -1,9 +1,9 @@
 // A layer of the network (jflnr/flnr/unet.py): convolution, bias, LeakyReLU.
 //
-// Defines beside WIDTH: SIDE of the kernel in blocks, 1 or 3; STRIDE, 1 or 2; INPUTS, OUTPUTS, numbers
-// of channels; TOGETHER, the outputs of one work-item, VECTORS, how many WIDTH neighbours it has of
-// each: TOGETHER x VECTORS sums stay in registers, and every input that is read serves TOGETHER
-// times, every weight VECTORS times; LEAKY, if negative outputs are divided by 10.
+// Defines beside WIDTH: SIDE of the kernel in blocks, 1 or 3; STRIDE, 1 or 2; TOGETHER, the outputs of
+// one work-item, VECTORS, how many WIDTH neighbours it has of each: TOGETHER x VECTORS sums stay in
+// registers, and every input that is read serves TOGETHER times, every weight VECTORS times; LEAKY,
+// if negative outputs are divided by 10.
 
 #include "vectors.h"
 #include "grids.h"
@@ -26,18 +26,18 @@ typedef float16 strided_t __attribute__((aligned(4)));
 
 #define INSIDE(i) ((x + (i)) < w ? 1 : 0)
 
-// from, to: maps, see maps.h; of `from_count` and `to_count` channels, of which INPUTS are read from
-// `from_first` on and OUTPUTS written from `to_first` on. The sizes h, w and pitch are those of `to`.
-// weights: (outputs / TOGETHER, SIDE, INPUTS, SIDE, TOGETHER), bias: (outputs), both with zeros up to
+// from, to: maps, see maps.h; of `from_count` and `to_count` channels, of which `inputs` are read from
+// `from_first` on and `outputs` written from `to_first` on. The sizes h, w and pitch are those of `to`.
+// weights: (outputs / TOGETHER, SIDE, inputs, SIDE, TOGETHER), bias: (outputs), both with zeros up to
 // a multiple of TOGETHER. Global size ((pitch - MARGIN) / PIXELS, outputs / TOGETHER, h + 2).
 kernel void convolve(
-    int h, int w, int pitch, int from_pitch, int from_count, int from_first, int to_count,
-    int to_first, global const float *weights, global const float *bias, global const float *from,
-    global float *to)
+    int h, int w, int pitch, int from_pitch, int from_count, int from_first, int inputs,
+    int to_count, int to_first, int outputs, global const float *weights, global const float *bias,
+    global const float *from, global float *to)
 {
     const int start = (int)get_global_id(0) * PIXELS, first = (int)get_global_id(1) * TOGETHER;
     const int y = (int)get_global_id(2) - 1;
-    if (start >= pitch - MARGIN || first >= OUTPUTS || y > h) return;
+    if (start >= pitch - MARGIN || first >= outputs || y > h) return;
 
     real sums[TOGETHER * VECTORS];
     const int inside = y >= 0 && y < h && start < w;
@@ -46,10 +46,11 @@ kernel void convolve(
         for (int o = 0; o < TOGETHER; ++o)
 #pragma unroll
             for (int v = 0; v < VECTORS; ++v) sums[o * VECTORS + v] = bias[first + o];
-        weights += (long)first * SIDE * SIDE * INPUTS;
-        from += MAP_AT(start * STRIDE - SIDE / 2, y * STRIDE - SIDE / 2, from_pitch, from_count, from_first);
-        for (int dy = 0; dy < SIDE; ++dy, from += (long)(from_count - INPUTS) * from_pitch)
-            for (int i = 0; i < INPUTS; ++i, from += from_pitch) {
+        weights += (long)first * SIDE * SIDE * inputs;
+        const int x = start * STRIDE - SIDE / 2, row = y * STRIDE - SIDE / 2;
+        from += MAP_AT(x, row, from_pitch, from_count, from_first);
+        for (int dy = 0; dy < SIDE; ++dy, from += (long)(from_count - inputs) * from_pitch)
+            for (int i = 0; i < inputs; ++i, from += from_pitch) {
 #pragma unroll
                 for (int dx = 0; dx < SIDE; ++dx, weights += TOGETHER) {
                     real values[VECTORS];
@@ -68,7 +69,7 @@ kernel void convolve(
     to += MAP_AT(start, y, pitch, to_count, to_first + first);
 #pragma unroll
     for (int o = 0; o < TOGETHER; ++o) {
-        if (first + o < OUTPUTS) {
+        if (first + o < outputs) {
             global float *row = to + (long)o * pitch;
             if (start == 0)
                 for (int i = 1; i <= MARGIN; ++i) row[-i] = 0;

@@ -70,20 +70,20 @@ INLINE real unpacked(global const float *said, int said_pitch, int x, int y, int
 
 // The finest level, whose models are scaled by max(1 + rate * restored, 0), a number for each 2 x 2
 // of them (energy.cl), and then by the gain. It acts on a little light even where the models predict
-// none. model: (Q + 1, C, h, pitch). Global size (pitch / WIDTH, h).
+// none. Global size (pitch / WIDTH, h).
 #define FACTOR(i) MAX(1 + rate[0] * restored[(x + (i)) / 2], 0)
 kernel void finish(
     int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, int said_pitch,
     int restored_pitch, global const float *said, global const float *fine,
     global const float *coarse, global const float *coarse_merged, global const float *share,
     global const float *mean, global const float *rate, global const float *restored,
-    global float *model)
+    global float *corrected)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
     fine += AT(x, y, pitch, MODELS);
     restored += (long)(y / 2) * restored_pitch;
-    model += (long)y * pitch + x;
+    corrected += AT(x, y, pitch, MODELS);
     const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
     const coarse_t before = coarse_at(coarse_merged, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
     const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
@@ -96,7 +96,7 @@ kernel void finish(
             const int k = q * C + c;
             const real step = READ(fine + k * GROUP) - doubled(&at, k);
             const real value = factor * (doubled(&before, k) + part * step);
-            WRITE(q ? gain * value : gain * (value + dark) - dark, model + (long)k * h * pitch);
+            WRITE(q ? gain * value : gain * (value + dark) - dark, corrected + k * GROUP);
         }
     }
 }
