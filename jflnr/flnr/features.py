@@ -21,6 +21,8 @@ GUIDES = ("normal", "depth", "ao")
 CHANNELS = 3
 # Light below this share of the frame's mean is as good as dark.
 DARK = 0.03
+# Guides that vary by more inside a block are beyond all that the network has seen.
+MOST_SPREAD = 9.0
 BLURS = 4
 OF_GRID, OF_STEP = 6, 6
 COUNT = 4 * (OF_GRID + OF_STEP + CHANNELS) + 2 * OF_STEP + BLURS + 2
@@ -82,6 +84,7 @@ def of_grid(grid: Grid, guides: int, mean: jax.Array) -> jax.Array:
     light = _light(grid.moments, guides) * inverse
     noise = jnp.sqrt(grid.noise[0] + 1e-12 * mean**2) * inverse
     own = [jnp.log(n + 0.01), log_light(light, mean), log_light(noise, mean)]
+    spread = jnp.minimum(spread, MOST_SPREAD)
     return jnp.concatenate([4 * jnp.sqrt(spread + 1e-4), jnp.stack(own)])
 
 

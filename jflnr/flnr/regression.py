@@ -23,7 +23,7 @@ from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import restoring_factor
 from jflnr.flr.floor import with_own_light
 from jflnr.flr.level import Fit, mean_guides
-from jflnr.flr.moments import Guides, centre
+from jflnr.flr.moments import Guides, centre, magnitude
 from jflnr.flr.pyramid import double
 
 # Side in pixels of the finest blocks.
@@ -83,6 +83,8 @@ def prepare(
     """All that comes before the network, and the shift of the guides, `(Q,)`."""
     numbers = ADAPTIVE_DEFAULT.numbers()
     shift = centre(guides)
+    unit = magnitude(target)
+    target = target / unit
     moments = adaptive.collect_light(target, guides, shift, weight, BLOCK)
     mean = adaptive.frame_mean(moments, shift.size)
     models = adaptive.fit_pilot(moments, mean, shift, numbers, BLOCK)
@@ -91,7 +93,10 @@ def prepare(
     coarsest, steps = widths.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
     factor = restoring_factor(steps[-1].merged, moments, shift.size, numbers.slack)
     x = features.of_steps(steps, shift.size, mean, None)
-    return prepared(x, coarsest, steps, factor, mean), shift
+    known = prepared(x, coarsest, steps, factor, mean)
+    differences = tuple(unit * difference for difference in known.differences)
+    own = {"coarsest": unit * known.coarsest, "differences": differences, "mean": unit * mean}
+    return known._replace(**own), shift
 
 
 def prepared(

@@ -51,7 +51,7 @@ def _solve(moments: jax.Array, regular: jax.Array, shift: jax.Array, channels: i
     if not shift.size:
         return system.mean_y[None]
     both = jnp.concatenate([system.correlation, system.right], axis=1)
-    slopes = _eliminate(both) * system.scale[:, None]
+    slopes = eliminate(both) * system.scale[:, None]
     value = system.mean_y - jnp.sum(system.mean_x[:, None] * slopes, axis=0)
     return jnp.concatenate([value[None], slopes])
 
@@ -97,9 +97,10 @@ def normal_equations(
     return NormalEquations(correlation, right, scale, mean_x, mean_y)
 
 
-def _eliminate(system: jax.Array) -> jax.Array:
-    """Gauss-Jordan on `(Q, Q + C, ...)`, symmetric with a diagonal near 1; `(Q, C, ...)`.
+def eliminate(system: jax.Array) -> jax.Array:
+    """Solve `[matrix, right]`, `(Q, Q + C, ...)`, by Gauss-Jordan elimination: `(Q, C, ...)`.
 
+    The matrix is symmetric with a diagonal near 1, and needs no search for pivots.
     A pivot no larger than the rounding error belongs to a guide that others already explain: its
     slope is 0.
     """

@@ -11,12 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from jflnr.flr.elimination import eliminate
 from jflnr.flr.moments import index_xx, index_xy
 from jflnr.flr.parameters import Parameters
 
 # Roundings that a variance, a difference of two sums, or a pivot may be off by.
 ROUNDING = 8
 Solver = Literal["cholesky", "block-inverse"]
+# So many guides are solved step by step as written out; of more, that compiles for minutes.
+WRITTEN_OUT = 8
 
 
 def solve(
@@ -87,9 +90,12 @@ def regularisation(parameters: Parameters) -> tuple[jax.Array, jax.Array]:
 def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
     """Solve `matrix @ a = right` by Cholesky in its root-free form, `matrix = L D L^T`.
 
+    Above `WRITTEN_OUT` guides by elimination, which has the same pivots, in a loop.
     matrix: `(Q, Q, h, w)`, symmetric with a diagonal near 1. right: `(Q, C, h, w)`.
     Returns `(Q, C, h, w)`.
     """
+    if matrix.shape[0] > WRITTEN_OUT:
+        return eliminate(jnp.concatenate([matrix, right], axis=1))
     steps = []
     while matrix.shape[0]:
         pivot, row, first = matrix[0, 0], matrix[0, 1:], right[0]

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import jax
+import numpy as np
 
 from jflnr import checks
 from jflnr.flr.adaptive import BLOCK, LEVELS
@@ -13,7 +14,7 @@ from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.arguments import channel_count, check_regression
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
-from jflnr.opencl.context import Context, default_context
+from jflnr.opencl.context import Context, default_context, is_device_array
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
 from jflnr.opencl.grids import Grid, Run
@@ -22,6 +23,9 @@ from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.pyramid import halve, halve_planes
 from jflnr.opencl.weighted_moments import collect_weighted
+
+# Light above this is divided by a power of two first: its squares would leave float32.
+BRIGHT = 1e15
 
 
 def flr_adaptive(
@@ -50,13 +54,28 @@ def flr_adaptive(
     checks.positive_integer("levels", levels)
     check_counts(channel_count(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
-    images = context.array(to_image(target)), to_layers(context, guides)
+    pixels = to_image(target)
+    unit = _unit(pixels)
+    pixels = pixels if unit == 1 else pixels / unit
+    images = context.array(pixels), to_layers(context, guides)
     counts = to_weight(context, weight)
     image = context.empty(target.shape) if keep_energy else output
     _denoise(context, *images, counts, parameters, max(block // 2, 1), levels, image)
     if keep_energy:
         rescale(context, image, images[0], counts, output)
+    if unit != 1:
+        output *= unit
     return context.finish(output, result)
+
+
+def _unit(pixels: Any) -> np.float32:
+    """What the light is divided by, from a sparse grid; 1 where it is on the device already."""
+    if is_device_array(pixels):
+        return np.float32(1)
+    rows, columns = (slice(None, None, max(size // 32, 1)) for size in pixels.shape[:2])
+    sample = np.abs(pixels[rows, columns])
+    largest = float(np.max(sample, where=np.isfinite(sample), initial=0))
+    return np.float32(2.0 ** (math.frexp(largest)[1] - 1) if largest > BRIGHT else 1)
 
 
 def _denoise(

@@ -8,14 +8,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from jflnr.flnr.features import BLURS, CHANNELS, COUNT, DARK, OF_GRID, OF_STEP
+from jflnr.flnr.features import BLURS, CHANNELS, COUNT, DARK, MOST_SPREAD, OF_GRID, OF_STEP
 from jflnr.opencl.grids import GROUP, Grid, Run
 from jflnr.opencl.level import Level
 from jflnr.opencl.network_unet import MARGIN, Maps, new_maps
 from jflnr.opencl.pyramid import halve
 
 FILE = "network/features.cl"
-DEFINES: dict[str, Any] = {"DARK": f"{DARK}f", "CHANNELS": COUNT}
+DEFINES: dict[str, Any] = {
+    "DARK": f"{DARK}f",
+    "MOST_SPREAD": f"{MOST_SPREAD}f",
+    "CHANNELS": COUNT,
+}
 PACKED = 4 * (OF_GRID + OF_STEP + CHANNELS)
 
 

@@ -1,7 +1,8 @@
 // What the network reads (jflnr/flnr/features.py), in a map on blocks twice as large as the finest.
 //
 // Defines beside those of the headers: COUNT, the number of planes of moments; CHANNELS, those of the
-// map; LOG, if `spread` and `tent` give light as log_light does.
+// map; MOST_SPREAD, above which a guide's variance is cut; LOG, if `spread` and `tent` give light as
+// log_light does.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -126,9 +127,9 @@ kernel void finest(
     const real noise = READ(moments + (COUNT - 1) * GROUP) + 1e-12f * mean[0] * mean[0];
     const real varied = spreads[0] + spreads[1] + spreads[2];
 #define PACK(k, value) pack(value, k, x, y, h, w, map_pitch, map)
-    PACK(0, 4 * sqrt(varied + 1e-4f));
-    PACK(1, 4 * sqrt(spreads[3] + 1e-4f));
-    PACK(2, 4 * sqrt(spreads[4] + 1e-4f));
+    PACK(0, 4 * sqrt(MIN(varied, MOST_SPREAD) + 1e-4f));
+    PACK(1, 4 * sqrt(MIN(spreads[3], MOST_SPREAD) + 1e-4f));
+    PACK(2, 4 * sqrt(MIN(spreads[4], MOST_SPREAD) + 1e-4f));
     PACK(3, log(n + 0.01f));
     PACK(4, log_light(own * inverse, mean[0]));
     PACK(5, log_light(sqrt(noise) * inverse, mean[0]));
