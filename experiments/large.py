@@ -149,7 +149,7 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     plots.write_text(folder / f"{NAME}_figures.md", text)
     with plots.figure(folder / f"{NAME}.png", columns=2, size=(5, 3.8)) as axes:
         for axis, key in zip(axes, ("MB", "seconds"), strict=True):
-            for method in METHODS:
+            for method in dict.fromkeys(row["method"] for row in result["memory"]):
                 for way, style in (("whole", "o-"), ("in pieces", "s--")):
                     rows = [r for r in result["memory"] if (r["method"], r["way"]) == (method, way)]
                     x, y = [r["megapixels"] for r in rows], [r[key] for r in rows]
