@@ -25,7 +25,7 @@ QUESTION = "What do large frames take, in memory and in time, whole and in piece
 METHODS = ("flr", "flr-adaptive", "flnr")
 # Pixels of the frames whose memory is measured, and what they may take in pieces.
 SIZES = ((1080, 1920), (2160, 3840), (4320, 7680))
-MEMORY = "1500M"
+MEMORY = "1800M"
 # A frame that does not fit, and the methods of which a crop can be denoised by itself.
 LARGEST, LARGEST_MEMORY = (8192, 16384), "4G"
 CROPPED = ("flr", "flr-adaptive")
@@ -103,7 +103,10 @@ def measured(arguments: list[str]) -> dict[str, Any]:
     """Peak memory, seconds and processor seconds of a command line in a process of its own."""
     command = [sys.executable, "-c", MEASURED, *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return json.loads(done.stdout.splitlines()[-1])
+    found = json.loads(done.stdout.splitlines()[-1])
+    if found.pop("code"):
+        raise ValueError(f"jflnr {' '.join(arguments)}: {done.stderr.strip()}")
+    return found
 
 
 def seams(path: Path) -> None:
