@@ -67,16 +67,19 @@ def shipped(method: str) -> unet.Params:
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
     wanted = "it should be a file of weights that `jflnr train` wrote"
-    try:
-        with zipfile.ZipFile(path) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
-                raise ValueError("it unpacks to more than any network here needs")
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except FileNotFoundError:
-        raise ValueError(f"{path}: there is no such file; {wanted}") from None
-    except Exception as error:  # damaged archives fail in many ways, some undocumented
-        raise ValueError(f"{path}: cannot be read ({error}); {wanted}") from None
+    if not path.exists():
+        raise ValueError(f"{path}: there is no such file; {wanted}")
+    with path.open("rb") as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                size = sum(entry.file_size for entry in archive.infolist())
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as stored:
+                if size <= LARGEST:
+                    return {name: stored[name] for name in stored.files}
+        except Exception:  # damaged archives fail in many ways, some undocumented
+            raise ValueError(f"{path}: cannot be read, or is damaged; {wanted}") from None
+    raise ValueError(f"{path}: unpacks to more than any network here needs; {wanted}")
 
 
 def _header(path: str | Path, text: np.ndarray | None) -> dict[str, Any]:
