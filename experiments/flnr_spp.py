@@ -70,8 +70,8 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     for metric, label in METRICS.items():
         by_method: dict[str, dict[str, Any]] = {}
         for row in rows:
-            mine = by_method.setdefault(row["method"], {"method": row["method"]})
-            mine[str(row["spp"])] = row[metric]
+            cells = by_method.setdefault(row["method"], {"method": row["method"]})
+            cells[str(row["spp"])] = row[metric]
         parts.append(f"{label}\n\n{results.table(list(by_method.values()), columns)}")
     plots.write_text(folder / f"{NAME}.md", "\n".join(parts))
     with plots.figure(folder / f"{NAME}.png", columns=2) as axes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,8 @@ def _rendered(path: Path, counts: tuple[int, ...], realisations: int) -> dict[st
         )
         camera = Camera(np.array(facts["camera_to_world"]), facts["fov_x_degrees"])
         tracer = Tracer.of(load(facts["scene"]).scene, camera, settings.width, settings.height)
-        noisy = {k: v.astype(np.float16) for k, v in frame.noisy(tracer, settings).items()}
+        rendered = frame.noisy(tracer, settings)
+        noisy: dict[str, Any] = {k: v.astype(np.float16) for k, v in rendered.items()}
         kept.parent.mkdir(parents=True, exist_ok=True)
         with replacing(kept) as beside, beside.open("wb") as file:
             np.savez(file, **noisy)

@@ -67,7 +67,7 @@ def flnr(
     models, own = finish(params, frame)
     # They are scaled already.
     rate, brightness = context.array(np.zeros(1, np.float32)), frame.restored[1]
-    restored = Restored(rate, brightness, own, frame.run.numbers.floor)
+    restored = Restored(rate, brightness, own, float(frame.run.numbers.floor))
     shift, sizes = frame.run.shift, models.sizes
     apply(context, models.planes, images[1], shift, BLOCK, sizes, image, restored)
     if keep_energy:
@@ -108,7 +108,9 @@ def finish(params: unet.Params, frame: Prepared) -> tuple[Grid, Grid]:
     run, steps, x, restored = frame
     said = network_unet.apply(run.context, params, x)
     merged = steps[0].coarse.models
-    for step, outputs, channel in zip(steps[:-1], said[::-1], (0, said[0].count - 1), strict=True):
+    for step, outputs, channel in zip(
+        steps[:-1], said[::-1], (0, said[0].channels - 1), strict=True
+    ):
         merged = _steer(run, step, outputs, channel, merged)
     models = _finish(run, steps[-1], said[0], merged, restored)
     return models, own_light(run, models, steps[-1].fine.moments)
@@ -163,4 +165,4 @@ def _defines(said: Maps) -> dict[str, Any]:
         "LARGEST_GAIN": regression.LARGEST_GAIN,
         "DARK": features.DARK,
     }
-    return {name: f"{number}f" for name, number in numbers.items()} | {"OUTPUTS": said.count}
+    return {name: f"{number}f" for name, number in numbers.items()} | {"OUTPUTS": said.channels}

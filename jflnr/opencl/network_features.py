@@ -79,7 +79,7 @@ def _in_grid(grid: Grid) -> Output:
 
 
 def _in_map(maps: Maps, channel: int) -> Output:
-    row = maps.count * maps.pitch
+    row = maps.channels * maps.pitch
     return Output(row + channel * maps.pitch + MARGIN, row, GROUP, maps.pitch, maps.values)
 
 

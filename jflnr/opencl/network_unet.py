@@ -23,11 +23,11 @@ BEYOND = 64
 class Maps(NamedTuple):
     """Channels over h x w blocks on the device, as kernels_cl/network/maps.h describes them.
 
-    values: flat, of `(h + 2, count, pitch)` and a little more.
+    values: flat, of `(h + 2, channels, pitch)` and a little more.
     """
 
     values: Any
-    count: int
+    channels: int
     h: int
     w: int
     pitch: int
@@ -107,7 +107,7 @@ def convolve(
         "VECTORS": _vectors(context),
     } | ({"LEAKY": 1} if leaky else {})  # fmt: skip
     arguments = (
-        to.h, to.w, to.pitch, x.pitch, x.count, first, inputs, to.count, to_first, outputs,
+        to.h, to.w, to.pitch, x.pitch, x.channels, first, inputs, to.channels, to_first, outputs,
         context.array(weights), context.array(np.pad(bias, (0, missing))), x.values, to.values,
     )  # fmt: skip
     size = (to.pitch - MARGIN) // (_vectors(context) * width), groups, to.h + 2
@@ -120,7 +120,7 @@ def convolve(
 def repeat(context: Context, x: Maps, to: Maps) -> None:
     """Repeat every value over 2 x 2 blocks, into the first channels of `to`."""
     width = context.width()
-    size = (to.pitch - MARGIN) // width, x.count, to.h + 2
-    arguments = to.h, to.w, to.pitch, x.pitch, x.count, to.count, x.values, to.values
-    moved = 5 * 4 * x.h * x.w * x.count
+    size = (to.pitch - MARGIN) // width, x.channels, to.h + 2
+    arguments = to.h, to.w, to.pitch, x.pitch, x.channels, to.channels, x.values, to.values
+    moved = 5 * 4 * x.h * x.w * x.channels
     context.run("repeat", "network/repeat.cl", {"WIDTH": width}, size, arguments, moved)

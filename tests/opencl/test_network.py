@@ -37,8 +37,8 @@ def to_maps(context: Context, image: np.ndarray) -> Maps:
 
 
 def planes_of(values: np.ndarray, maps: Maps) -> np.ndarray:
-    size = (maps.h + 2) * maps.count * maps.pitch
-    return values[:size].reshape(maps.h + 2, maps.count, maps.pitch)
+    size = (maps.h + 2) * maps.channels * maps.pitch
+    return values[:size].reshape(maps.h + 2, maps.channels, maps.pitch)
 
 
 def to_image_of(maps: Maps) -> np.ndarray:
