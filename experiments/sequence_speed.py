@@ -24,7 +24,10 @@ NAME = "sequence_speed"
 QUESTION = "What does a frame with a history take, against BMFR and the memory floor?"
 
 WIDTH, HEIGHT = 1280, 720
-COLUMNS = {"method": "method", "ms": "ms", "floors": "x floor", "per_bmfr": "x BMFR (JAX)"}
+BMFR = {"per_bmfr": "BMFR, JAX", "per_kernels": "BMFR, OpenCL"}
+COLUMNS = {"method": "method", "ms": "ms", "floors": "x floor"} | {
+    key: f"x {name}" for key, name in BMFR.items()
+}
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -37,8 +40,8 @@ def run(quick: bool) -> dict[str, Any]:
             "method": name,
             "ms": 1e3 * t,
             "floors": t / seconds["memory floor"],
-            "per_bmfr": t / seconds["BMFR, JAX"],
         }
+        | {key: t / seconds[other] for key, other in BMFR.items() if other in seconds}
         for name, t in seconds.items()
     ]
     return {"device": jax.default_backend(), "width": size[1], "height": size[0], "rows": rows}
@@ -55,9 +58,13 @@ def calls(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
         found[f"{method}, temporal, JAX"] = second(temporal.start, step, *frames)
     found["BMFR, JAX"] = second(bmfr.start, bmfr.step, *frames)
     if "opencl" in backends():
-        from jflnr.opencl import bmfr as kernels
+        from jflnr.opencl import bmfr as bmfr_kernels
+        from jflnr.opencl import temporal as kernels
 
-        found["BMFR, OpenCL"] = second(kernels.start, kernels.step, before, now)
+        for method in sequence.METHODS:
+            step = functools.partial(kernels.step, method=method)
+            found[f"{method}, temporal, OpenCL"] = second(kernels.start, step, before, now)
+        found["BMFR, OpenCL"] = second(bmfr_kernels.start, bmfr_kernels.step, before, now)
     return found | {"SVGF, JAX": second(svgf.start, svgf.step, *frames)}
 
 

@@ -22,6 +22,7 @@ TABLES = {
     "psnr": "PSNR in dB, mean from frame 8 on",
     "psnr_unbiased": "The same without the noise of the references",
     "warped": "Warped temporal error x 1000, mean from frame 8 on",
+    "false": "False change x 1000: RMS of what of it is not the references', from frame 8 on",
     "ssim": "SSIM, mean of all frames (BMFR, Table 2)",
     "rmse": "RMSE of the displayed picture, mean of all frames (BMFR, Table 2)",
     "temporal": "Temporal error, mean of all frames (BMFR, Table 3)",
@@ -84,6 +85,7 @@ def measured(shot: shots.Shot, lights: list[np.ndarray]) -> dict[str, Any]:
         "psnr": float(np.mean(course["psnr"][SETTLED:])),
         "psnr_unbiased": mean([frame["psnr_unbiased"] for frame in frames[SETTLED:]]),
         "warped": float(np.mean(course["warped"][SETTLED:])),
+        "false": root_mean([frame.get("false") for frame in frames[SETTLED:]]),
         "ssim": float(np.mean(course["ssim"])),
         "rmse": float(np.mean(rmse)),
         "temporal": float(np.mean(course["temporal"][1:])),
@@ -112,6 +114,12 @@ def mean(values: list[float | None]) -> float | None:
     return float(np.mean(found)) if len(found) == len(values) else None
 
 
+def root_mean(squares: list[float | None]) -> float | None:
+    """The root of the mean of squares, which less noise of the references may leave below 0."""
+    found = mean(squares)
+    return None if found is None else max(found, 0) ** 0.5
+
+
 def margins(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """How each of our methods with a history compares with others, sequence by sequence."""
     by = {(row["shot"], row["method"]): row for row in rows}
@@ -124,6 +132,8 @@ def margins(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             if (theirs := by.get((row["shot"], other))) is not None:
                 line[f"PSNR above {title}"] = row["psnr"] - theirs["psnr"]
                 line[f"warped error below {title}, times"] = theirs["warped"] / row["warped"]
+                if row.get("false") and theirs.get("false"):
+                    line[f"false change below {title}, times"] = theirs["false"] / row["false"]
                 if "lag" in row and other == "BMFR":
                     line["lag / BMFR's"] = row["lag"] / theirs["lag"]
         found.append(line)
@@ -157,7 +167,7 @@ def table(rows: list[dict[str, Any]], key: str) -> str:
     lines: dict[str, dict[str, Any]] = {}
     for row in rows:
         if row.get(key) is not None:
-            value = row[key] * (1000 if key == "warped" else 1)
+            value = row[key] * (1000 if key in ("warped", "false") else 1)
             lines.setdefault(row["method"], {"method": row["method"]})[row["shot"]] = value
     names = list(dict.fromkeys(row["shot"] for row in rows if row.get(key) is not None))
     columns = {"method": "method"} | {name: name.replace("_", ", ") for name in names}
@@ -192,7 +202,7 @@ def chart(
 ) -> None:
     """What `values` finds in a row, over frames; a panel for each sequence."""
     names = list(dict.fromkeys(row["shot"] for row in rows))
-    columns = min(len(names), 3)
+    columns = min(len(names), 4)
     with plots.figure(path, columns, (4, 2.8), -(-len(names) // columns)) as axes:
         panels = np.atleast_1d(axes)
         for axis, name in zip(panels, names, strict=False):
@@ -204,4 +214,7 @@ def chart(
         for axis in panels[len(names) :]:
             axis.remove()
         panels[0].set_ylabel(label)
-        panels[0].legend(fontsize=6)
+        # Below the panels, where it covers no curve.
+        handles, labels = panels[0].get_legend_handles_labels()
+        legend = {"loc": "outside lower center", "ncols": min(len(labels), 5), "fontsize": 8}
+        panels[0].figure.legend(handles, labels, **legend)

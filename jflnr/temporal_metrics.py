@@ -29,7 +29,8 @@ _find_taps = jax.jit(find_taps)
 
 
 def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[dict]:
-    """`psnr`, `psnr_unbiased`, `ssim`, `temporal_error` and `warped_error` of every frame.
+    """`psnr`, `psnr_unbiased`, `ssim`, and the errors `temporal`, `warped` and `false` (that of
+    `false_change`) of every frame.
 
     psnr_unbiased leaves out the noise of the references (`jflnr.metrics.unbiased_mse`, on displayed
     pictures); None without half references, and where nothing else is left.
@@ -46,6 +47,7 @@ def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[d
         pair = (frames[i - 1], frames[i]), (lights[i - 1], lights[i])
         rows[i]["temporal"] = temporal_error(*pair, scale)
         rows[i]["warped"] = warped_error(*pair, scale)
+        rows[i]["false"] = false_change(*pair, scale)
     return rows
 
 
@@ -83,14 +85,40 @@ def warped_error(frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale
     Of the pixels that both frames show; NaN if there are none. Both lights are multiplied by the
     second frame's albedo, so that neither motion nor the resampling of a texture counts.
     """
+    change = _warped_change(frames, lights, scale)
+    return float(np.mean(np.abs(change))) if change.size else float("nan")
+
+
+def false_change(
+    frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float
+) -> float | None:
+    """Mean square of what differs between the change that `warped_error` sees and the true one.
+
+    So what flickers counts, and what should change and does not. The half references leave out
+    their noise, hence it may be below 0; None without them.
+    """
+    halves_a, halves_b = [], []
+    for frame in frames:
+        if frame.reference_a is None or frame.reference is None:
+            return None
+        halves_a.append(np.asarray(frame.reference_a, np.float32))
+        halves_b.append(2 * np.asarray(frame.reference, np.float32) - halves_a[-1])
+    pairs = lights, (halves_a[0], halves_a[1]), (halves_b[0], halves_b[1])
+    change, true_a, true_b = (_warped_change(frames, pair, scale) for pair in pairs)
+    return float(np.mean((change - true_a) * (change - true_b))) if change.size else None
+
+
+def _warped_change(
+    frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float
+) -> np.ndarray:
+    """Changes of luminance, of the pixels that both frames show, `(n,)`."""
     before, now = frames
     taps = taps_between(before, now)
     seen = np.asarray(taps.seen)[..., 0]
     if now.mask is not None:
         seen = seen & (np.asarray(now.mask)[..., 0] > 0)
     moved = np.asarray(gather(taps, np.asarray(lights[0], np.float32)))
-    change = np.abs(_shown(now, lights[1], scale) - _shown(now, moved, scale))
-    return float(np.mean(change[seen])) if seen.any() else float("nan")
+    return (_shown(now, lights[1], scale) - _shown(now, moved, scale))[seen]
 
 
 def taps_between(before: Frame, now: Frame) -> Taps:

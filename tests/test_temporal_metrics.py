@@ -79,6 +79,27 @@ def test_the_noise_of_the_reference_can_be_left_out() -> None:
     assert row["psnr"] < known["psnr"] - 1
 
 
+def test_only_what_does_not_truly_change_is_a_false_change() -> None:
+    """Of noisy references, one of which gets brighter."""
+    rng = np.random.default_rng(4)
+    frames = []
+    for frame, light in zip(shot([0, 0]), (1.0, 1.5), strict=True):
+        truth = np.full_like(frame.reference, light)
+        half_a, half_b = (truth * (1 + 0.1 * rng.standard_normal(truth.shape)) for _ in range(2))
+        half = {"reference": (half_a + half_b) / 2, "reference_a": half_a}
+        frames.append(dataclasses.replace(frame, **half))
+    bright, dark = np.full_like(half_a, 1.5), np.full_like(half_a, 1.0)
+    scale = temporal_metrics.sequence_exposure(frames)
+    pair = frames[0], frames[1]
+    true = temporal_metrics.warped_error(pair, (dark, bright), scale)
+    follows, lags = (
+        temporal_metrics.false_change(pair, lights, scale)
+        for lights in ((dark, bright), (dark, dark))
+    )
+    assert lags == pytest.approx(true**2, rel=0.1)
+    assert abs(follows) < 0.02 * lags
+
+
 @pytest.mark.parametrize("delay", [0, 3, 2.5])
 def test_lag_of_a_delayed_sequence(delay: float) -> None:
     time = np.arange(LENGTH)

@@ -61,7 +61,7 @@ def fit(
     )
     surface = surface & jnp.all(jnp.isfinite(features), axis=-1, keepdims=True)
     # Sums over a block of light near the type's maximum must not overflow.
-    unit = jnp.maximum(magnitude(light), 1)
+    unit = jnp.maximum(magnitude(jnp.asarray(light)), 1)
     there, z = cut(surface), cut(light / unit)
     t = scaled_features(cut(features), there, squares)
     used = there & jnp.all(jnp.isfinite(z), axis=-1, keepdims=True)
@@ -72,7 +72,8 @@ def fit(
     alpha = jax.scipy.linalg.solve_triangular(r[..., :count], r[..., count:])
     fitted = (t @ alpha).reshape(len(rows), len(columns), block, block, channels)
     image = fitted.swapaxes(1, 2).reshape(len(rows) * block, len(columns) * block, channels)
-    return jax.lax.dynamic_slice(image, (*offset, 0), light.shape) * unit
+    start = jnp.append(jnp.asarray(offset), 0)
+    return jax.lax.dynamic_slice(image, start, light.shape) * unit
 
 
 def mirrored(size: int, block: int, offset: Any) -> jax.Array:

@@ -26,7 +26,7 @@ from jflnr.flr.window import gather
 BLOCK = 32
 # Share of the newest frame in the evidence.
 NEWEST = 0.5
-# How much of the evidence for a change goes with it when it is added; the rest says that it goes on.
+# How much of the evidence for a change goes when that is added; the rest says that it goes on.
 FOLLOWED = 0.7
 # Changes count relative to the brightness, of which this share of the frame's mean is added.
 DIM = 0.3
