@@ -23,7 +23,7 @@ from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import restoring_factor
 from jflnr.flr.floor import with_own_light
 from jflnr.flr.level import Fit, mean_guides
-from jflnr.flr.moments import Guides, centre, magnitude
+from jflnr.flr.moments import Guides, centre, index_xy, magnitude
 from jflnr.flr.pyramid import double
 
 # Side in pixels of the finest blocks.
@@ -95,7 +95,10 @@ def prepare(
     x = features.of_steps(steps, shift.size, mean, None)
     known = prepared(x, coarsest, steps, factor, mean)
     differences = tuple(unit * difference for difference in known.differences)
-    own = {"coarsest": unit * known.coarsest, "differences": differences, "mean": unit * mean}
+    # Without light there is none for the gain to act on, either.
+    lit = jnp.sum(moments[index_xy(0, 0, shift.size, 1)]) > 0
+    mean = jnp.where(lit, unit * mean, 0)
+    own = {"coarsest": unit * known.coarsest, "differences": differences, "mean": mean}
     return known._replace(**own), shift
 
 
