@@ -12,7 +12,7 @@ import numpy as np
 from experiments.stability import drawing, fireflies
 from experiments.stability.cases import CASES, Case, Type, make
 from experiments.stability.measures import measure, passes
-from experiments.stability.methods import EXACT, METHODS, OURS, TRUTHS, Method
+from experiments.stability.methods import EXACT, METHODS, ON_DEVICE, OURS, TRUTHS, Method, exists
 
 NAME = "stability"
 QUESTION = "On which inputs does which solver fail, and does ours on any?"
@@ -34,7 +34,7 @@ def run(quick: bool) -> dict[str, Any]:
     methods = {name: m for name, m in METHODS.items() if name not in skipped}
     if not _opencl_works():
         print("  no OpenCL device: those cells stay empty", flush=True)
-        methods.pop("ours, OpenCL")
+        methods = {name: m for name, m in methods.items() if name not in ON_DEVICE}
     rows = []
     for case in CASES:
         for precision in precisions:
@@ -57,7 +57,7 @@ def cells(name: str, precision: str, methods: dict[str, Method]) -> list[dict[st
         exact = EXACT(case, np.float64)
         rows = []
         for method, solve in methods.items():
-            if method == "ours, OpenCL" and precision == "float64":
+            if not exists(method, case, arithmetic):
                 continue
             truth = TRUTHS[method](case, np.float64) if method in TRUTHS else exact
             figures = measure(case, solve(case, arithmetic), truth, exact)

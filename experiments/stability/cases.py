@@ -131,6 +131,13 @@ def _one_pixel_wide(r: Room) -> Case:
     return r.case(guides, light=0.3 + stripe + 0.2 * r.guides[..., 4], edge=False)
 
 
+def _border_only(r: Room) -> Case:
+    """Of the frame only the outermost pixels can be used: a line one pixel wide."""
+    usable = np.ones(r.x.shape, bool)
+    usable[1:-1, 1:-1] = False
+    return r.case(usable=usable, edge=False)
+
+
 def _half_masked(r: Room) -> Case:
     """Beyond the mask the depth says infinitely far, as renderers write for the sky."""
     usable = (r.x + r.y < 0.6) | (r.rng.random(r.x.shape) < 0.1)
@@ -161,6 +168,11 @@ def _subnormal_radiance(r: Room) -> Case:
     return r.case(light=r.light() * scale)
 
 
+def _subnormal_guide(r: Room) -> Case:
+    scale = float(jnp.finfo(r.dtype).tiny) / 4
+    return r.case(r.guides * np.where(np.arange(5) == 0, scale, 1))
+
+
 def _radiance_near_maximum(r: Room) -> Case:
     light = r.light() * _large(r.dtype)
     return r.case(light=light, noisy=np.minimum(r.one_sample(light), 2.5 * _large(r.dtype)))
@@ -185,6 +197,7 @@ CASES: dict[str, Callable[[Room], Case]] = {
     "16 guides, rank 5": _more_guides_than_directions,
     "normals of a plane": _plane,
     "1-pixel stripes": _one_pixel_wide,
+    "1-pixel border": _border_only,
     "step in a flat region": _step_in_flat_region,
     "half masked, far sky": _half_masked,
     "black": _black,
@@ -192,6 +205,7 @@ CASES: dict[str, Callable[[Room], Case]] = {
     "fireflies of 1e4": _fireflies,
     "negative radiance": _negative_radiance,
     "subnormal radiance": _subnormal_radiance,
+    "subnormal guide": _subnormal_guide,
     "radiance near maximum": _radiance_near_maximum,
     "guide near maximum": _guide_near_maximum,
 }

@@ -13,10 +13,13 @@ import numpy as np
 
 from experiments.stability import solvers
 from experiments.stability.cases import Case, Type
+from jflnr.flnr.regression import flnr
+from jflnr.flnr.weights import shipped
 from jflnr.flr.adaptive import flr_adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
+from jflnr.temporal import bmfr_fit
 
 BLOCK = 8
 SUPPORT = 96  # covers the whole of a small frame, as the truth does
@@ -56,15 +59,17 @@ def _bilinear(size: int) -> np.ndarray:
     return np.maximum(1 - np.abs(position[:, None] - blocks), 0)
 
 
+# Optimising large programs takes longer than the whole atlas, and changes the last bits at most.
+unoptimised = functools.partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
+
+
 @functools.cache
 def _compiled(solver: Any, guides: int) -> Callable[..., jax.Array]:
-    # Optimising the program of 16 guides takes minutes, and changes the last bits at most.
-    options = {"xla_backend_optimization_level": 0} if guides > 8 else None
-    return jax.jit(
+    compiled = jax.jit if guides <= 8 else unoptimised
+    return compiled(
         lambda y, x, usable: flr(
             y, x, DEFAULT, block=BLOCK, support=SUPPORT, weight=usable, solver=solver
-        ),
-        compiler_options=options,
+        )
     )
 
 
@@ -78,18 +83,49 @@ def by_jax(solver: str, case: Case, dtype: Type) -> np.ndarray:
         return np.asarray(_compiled(solver, guides)(y, x, jnp.asarray(case.usable)))
 
 
+def channel_by_channel(method: Method, case: Case, dtype: Type) -> np.ndarray:
+    """The noisy image and the light apart, for a method that is not linear in its input."""
+    parts = [case._replace(target=case.target[..., c : c + 1]) for c in range(2)]
+    return np.concatenate([method(part, dtype)[..., :1] for part in parts], axis=-1)
+
+
+def _in_jax(program: Callable[..., jax.Array], case: Case, dtype: Type) -> np.ndarray:
+    with jax.enable_x64(dtype == np.float64):
+        y, x = (jnp.asarray(a.astype(dtype)) for a in (case.target, case.guides))
+        return np.asarray(program(y, x, jnp.asarray(case.usable)))
+
+
 @functools.cache
 def _adaptive() -> Callable[..., jax.Array]:
-    return jax.jit(lambda y, x, usable: flr_adaptive(y, x, ADAPTIVE_DEFAULT, weight=usable))
+    return unoptimised(lambda y, x, usable: flr_adaptive(y, x, ADAPTIVE_DEFAULT, weight=usable))
 
 
 def by_adaptive(case: Case, dtype: Type) -> np.ndarray:
-    """Adaptive FLR, of the noisy image and of the light apart: it is not linear in its input."""
-    with jax.enable_x64(dtype == np.float64):
-        y, x = (jnp.asarray(a.astype(dtype)) for a in (case.target, case.guides))
-        usable = jnp.asarray(case.usable)
-        found = [_adaptive()(y[..., c : c + 1], x, usable) for c in range(y.shape[2])]
-        return np.concatenate([np.asarray(image) for image in found], axis=-1)
+    """Adaptive FLR of one channel."""
+    return _in_jax(_adaptive(), case, dtype)
+
+
+@functools.cache
+def _flnr() -> Callable[..., jax.Array]:
+    params = shipped("flnr")
+    return unoptimised(
+        lambda y, x, usable: flnr(jnp.repeat(y, 3, axis=-1), x, params, weight=usable)
+    )
+
+
+def by_flnr(case: Case, dtype: Type) -> np.ndarray:
+    """FLNR with the weights that ship, of one channel as grey."""
+    return _in_jax(_flnr(), case, dtype)
+
+
+@jax.jit
+def _bmfr(y: jax.Array, x: jax.Array, usable: jax.Array) -> jax.Array:
+    return bmfr_fit.fit(y, x, usable[..., None], 3, jnp.array([5, 7]))
+
+
+def by_bmfr(case: Case, dtype: Type) -> np.ndarray:
+    """The fit of method `bmfr`, in its own blocks of 32."""
+    return _in_jax(_bmfr, case, dtype)
 
 
 def by_opencl(case: Case, dtype: Type) -> np.ndarray:
@@ -99,6 +135,14 @@ def by_opencl(case: Case, dtype: Type) -> np.ndarray:
     return on_device(
         case.target, case.guides, DEFAULT, block=BLOCK, support=SUPPORT, weight=case.usable
     )
+
+
+def by_adaptive_opencl(case: Case, dtype: Type) -> np.ndarray:
+    """Adaptive FLR's kernels, of one channel."""
+    from jflnr.opencl import flr_adaptive as on_device
+
+    target = np.ascontiguousarray(case.target)
+    return on_device(target, case.guides, ADAPTIVE_DEFAULT, weight=case.usable)
 
 
 METHODS: dict[str, Method] = {
@@ -112,12 +156,25 @@ METHODS: dict[str, Method] = {
     "ours, block inverse": functools.partial(by_jax, "block-inverse"),
     "ours, Cholesky": functools.partial(by_jax, "cholesky"),
     "ours, OpenCL": by_opencl,
-    "ours, adaptive": by_adaptive,
+    "ours, adaptive": functools.partial(channel_by_channel, by_adaptive),
+    "ours, adaptive OpenCL": functools.partial(channel_by_channel, by_adaptive_opencl),
+    "ours, FLNR": functools.partial(channel_by_channel, by_flnr),
+    "ours, BMFR's fit": by_bmfr,
 }
+ON_DEVICE = ("ours, OpenCL", "ours, adaptive OpenCL")
+# Their arithmetic is float32.
+SINGLE = (*ON_DEVICE, "ours, FLNR", "ours, BMFR's fit")
 # The exact answer to the problem that a method solves, in float64.
 UNREGULARISED = functools.partial(by_numpy, solvers.svd)
 TRUTHS: dict[str, Method] = {
     name: UNREGULARISED for name in ("inverse (Eq. 7)", "LU", "Householder QR", "SVD")
 } | {"Tikhonov (Eq. 11)": functools.partial(by_numpy, solvers.tikhonov_exact)}
 EXACT: Method = functools.partial(by_numpy, solvers.exact)
-OURS = ("ours, block inverse", "ours, Cholesky", "ours, OpenCL", "ours, adaptive")
+OURS = tuple(name for name in METHODS if name.startswith("ours"))
+
+
+def exists(method: str, case: Case, dtype: Type) -> bool:
+    """Whether the method can be asked: not all compute in float64, and FLNR takes five guides."""
+    if method == "ours, FLNR" and case.guides.shape[2] != 5:
+        return False
+    return dtype != np.float64 or method not in SINGLE

@@ -1,4 +1,4 @@
-"""The bar of the atlas on every case: finite, in range, near the exact answer; gradients finite."""
+"""The bar of the atlas on every case: finite, in range, near the exact answer."""
 
 import functools
 
@@ -9,13 +9,17 @@ import pytest
 
 from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
-from experiments.stability.measures import measure, passes
-from experiments.stability.methods import EXACT, METHODS
-from jflnr.flr.parameters import DEFAULT, Parameters
+from experiments.stability.measures import OVERSHOOT_BAR, measure, passes
+from experiments.stability.methods import EXACT, METHODS, ON_DEVICE
+from jflnr.flr.parameters import Parameters
 from jflnr.flr.regression import flr
 from jflnr.opencl import flr as on_device
 
 MANY = "16 guides, rank 5"
+FIVE_GUIDES = [case for case in CASES if case != MANY]
+# These solve other problems than that of the exact answer; the first three take no negative light,
+# and give black for it.
+OTHERS = ("ours, adaptive", "ours, adaptive OpenCL", "ours, FLNR", "ours, BMFR's fit")
 
 
 @functools.cache
@@ -26,31 +30,51 @@ def exact(name, storage):
         return case, EXACT(case, np.float64)
 
 
-@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
-@pytest.mark.parametrize(
-    ("method", "storage", "case"),
-    [
-        # Sixteen guides take as long to compile as all the rest, so once is enough.
-        *(("ours, Cholesky", np.float32, case) for case in CASES),
-        *(("ours, Cholesky", np.float16, case) for case in CASES if case != MANY),
-        *(("ours, OpenCL", np.float32, case) for case in CASES),
-        *(("ours, OpenCL", np.float16, case) for case in CASES),
-        *(("ours, adaptive", np.float32, case) for case in CASES if case != MANY),
-        *(("ours, adaptive", np.float16, case) for case in CASES if case != MANY),
-    ],
-)
-def test_ours_clears_the_bar(method, storage, case):
-    if method == "ours, OpenCL":
+def clears_the_bar(method, storage, case):
+    if method in ON_DEVICE:
         _needs_a_device()
     made, truth = exact(case, storage)
     result = METHODS[method](made, np.float32)
     assert np.isfinite(result).all(), "also outside the mask"
     figures = measure(made, result, truth, truth)
+    if case == "negative radiance" and method in OTHERS[:3]:
+        assert figures["overshoot"] <= OVERSHOOT_BAR
+        return
     assert passes(figures), figures
     # Far below the noise: the rounding of float32, grown by the condition that eps' allows.
-    # Subnormal numbers count as 0 on some devices. Adaptive FLR solves other problems.
-    rounded = figures["rounding"] < 1e-4
-    assert rounded or case == "subnormal radiance" or method == "ours, adaptive"
+    # Subnormal numbers count as 0 on some devices.
+    assert figures["rounding"] < 1e-4 or case == "subnormal radiance" or method in OTHERS
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("storage", [np.float32, np.float16])
+@pytest.mark.parametrize(
+    ("method", "case"),
+    [
+        *(("ours, Cholesky", case) for case in CASES),
+        *(("ours, OpenCL", case) for case in CASES),
+        *(("ours, BMFR's fit", case) for case in CASES),
+        *(("ours, adaptive", case) for case in FIVE_GUIDES),
+    ],
+)
+def test_ours_clears_the_bar(method, storage, case):
+    clears_the_bar(method, storage, case)
+
+
+@pytest.mark.slow  # compiles long
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("storage", [np.float32, np.float16])
+@pytest.mark.parametrize(
+    ("method", "case"),
+    [
+        *(("ours, block inverse", case) for case in CASES),
+        *(("ours, adaptive OpenCL", case) for case in CASES),
+        *(("ours, FLNR", case) for case in FIVE_GUIDES),
+        ("ours, adaptive", MANY),
+    ],
+)
+def test_ours_clears_the_bar_too(method, storage, case):
+    clears_the_bar(method, storage, case)
 
 
 def _needs_a_device():
@@ -61,29 +85,6 @@ def _needs_a_device():
         default_context()
     except NoDevice as error:
         pytest.skip(str(error))
-
-
-@functools.cache
-def _gradient():
-    def mean(target, guides, parameters, usable):
-        # A mean, not a sum of squares: that would itself overflow near the type's maximum.
-        light = flr(target, guides, parameters, support=96, weight=usable)
-        ramp = jnp.linspace(-1, 1, light.size).reshape(light.shape)
-        return jnp.sum(light / light.size * ramp)
-
-    # Optimising would take longer than all the cases.
-    options = {"xla_backend_optimization_level": 0}
-    return jax.jit(jax.grad(mean, argnums=(0, 1, 2)), compiler_options=options)
-
-
-@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
-@pytest.mark.parametrize("case", [case for case in CASES if case != MANY])
-def test_gradients_are_finite(case):
-    made, _ = exact(case, np.float32)
-    target, guides, usable = map(jnp.asarray, (made.target, made.guides, made.usable))
-    parameters = jax.tree.map(jnp.float32, DEFAULT)
-    for gradient in jax.tree.leaves(_gradient()(target, guides, parameters, usable)):
-        assert np.isfinite(gradient).all()
 
 
 # Without any regularisation only rounding says how much of a variance is known; the largest says

@@ -1,0 +1,202 @@
+"""Derivatives of the public functions that no other file here checks (docs/stability.md)."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax import random
+
+from jflnr.flnr import paper, regression
+from jflnr.flnr.loss import relative
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.elimination import solve_strips
+from jflnr.flr.energy import rescale, restore
+from jflnr.flr.moments import collect, plane_count
+from jflnr.flr.noisy_guides import smooth_guide
+from jflnr.flr.parameters import Parameters
+from jflnr.flr.pyramid import double, halve
+from jflnr.flr.solve import cholesky_solve, solve
+from jflnr.flr.uncertainty import flr_adaptive_with_error
+from jflnr.flr.weighted_moments import collect_weighted
+from jflnr.flr.window import gather_moments, window_over
+from jflnr.frame import Frame, composite
+from jflnr.selection import nested
+from jflnr.temporal import (
+    Average,
+    Camera,
+    Surface,
+    accumulate,
+    bmfr,
+    bmfr_fit,
+    bmfr_taa,
+    camera_motion,
+    find_taps,
+    gather,
+    sequence,
+)
+from tests.gradients.directions import agree
+
+SIZE = 6, 7
+SHIFT = np.array([0.1, -0.2])
+PARAMETERS = Parameters.of(sigma=5.0, eps=1e-2, eps_prime=1e-2)
+RNG = np.random.default_rng(2)
+
+
+def normal(*shape):
+    return RNG.standard_normal(shape)
+
+
+def positive(*shape):
+    return 0.3 + RNG.random(shape)
+
+
+def moments_of(guides, channels, *grid):
+    """Moments that belong to pixels: `(K, h, w)`."""
+    y, x = normal(8 * grid[0], 8 * grid[1], channels), normal(8 * grid[0], 8 * grid[1], guides)
+    with jax.enable_x64(True):
+        return np.asarray(collect(jnp.asarray(y), jnp.asarray(x), jnp.zeros(guides), 8))
+
+
+def well_posed(count):
+    factor = normal(count, count)
+    return (factor @ factor.T / count + np.eye(count))[..., None, None]
+
+
+STEPS = {
+    "moments by weights": (
+        lambda y, x, w, b: collect(y, x, jnp.asarray(SHIFT), 2, w, b),
+        (normal(*SIZE, 2), normal(*SIZE, 2), positive(*SIZE), positive(2)),
+    ),
+    "weighted moments": (
+        lambda y, x, w, s: collect_weighted(y, x, jnp.asarray(SHIFT), w, s, 2),
+        (normal(*SIZE, 2), normal(*SIZE, 2), positive(*SIZE), positive(*SIZE)),
+    ),
+    "edge-aware window": (
+        lambda f, sigma, m: gather_moments(m, window_over(f, sigma), 1.3, 2, 1),
+        (normal(2, 4, 5), 1.5, normal(plane_count(2, 1), 4, 5)),
+    ),
+    "pyramid": (lambda p: double(halve(p), 5, 7), (normal(2, 5, 7),)),
+    "strips": (
+        lambda m, e, p: solve_strips(m, jnp.asarray(SHIFT), e, p, 2),
+        (moments_of(2, 2, 2, 3), positive(2, 3), positive(2, 3)),
+    ),
+    "solve, 16 guides": (cholesky_solve, (well_posed(16), normal(16, 2, 1, 1))),
+    "normalised solve, 16 guides": (
+        lambda m, p: solve(m, jnp.full(16, 0.1), p, 1),
+        (moments_of(16, 1, 1, 1), PARAMETERS),
+    ),
+    "orders of models": (
+        lambda m, e, n: nested.fit_orders(m, jnp.asarray(SHIFT), (e, e), n, (1, 1), 1),
+        (moments_of(2, 1, 2, 3), positive(2, 3), 0.01 * positive(2, 3)),
+    ),
+    "smoothing of a guide": (
+        smooth_guide,
+        (positive(*SIZE, 1), normal(*SIZE, 3) / 9, 5 + positive(*SIZE, 1) / 9),
+    ),
+    "energy": (
+        lambda c, m, image, light: (restore(c, m, 2, 0.01), rescale(image, light, None)),
+        (positive(3, 3, 4, 6), moments_of(2, 1, 2, 3), positive(*SIZE, 3), positive(*SIZE)),
+    ),
+    "FLNR of the paper": (
+        lambda y, x, w, p: paper.flnr_of_paper(y, x, w, p, block=2, support=12),
+        (
+            positive(*SIZE, 2),
+            normal(*SIZE, 2),
+            paper.init(random.key(0), 4, 2, (3, 4)),
+            PARAMETERS,
+        ),
+    ),
+    "composite": (
+        lambda a, light: composite(frame_of(albedo=a), light),
+        (positive(*SIZE, 3), positive(*SIZE, 3)),
+    ),
+    "accumulation": (
+        lambda before, n, image, least: accumulate(Average(before, n), image, least),
+        (normal(*SIZE, 2), 1 + positive(*SIZE, 1), normal(*SIZE, 2), 0.4),
+    ),
+    "reprojection by motion and image": (
+        lambda motion, image: gather(find_taps(motion, wall(), wall()), image),
+        # Between pixels: where a tap becomes another, the derivative jumps.
+        (0.2 + 0.6 * RNG.random((*SIZE, 2)), normal(*SIZE, 2)),
+    ),
+    "motion by depth and camera": (
+        lambda d, turn, fov: camera_motion(
+            d, Camera(jnp.eye(4), fov), Camera(jnp.eye(4).at[:3].add(turn / 20), fov)
+        ),
+        (3 + positive(*SIZE, 1), normal(3, 4), 50.0),
+    ),
+    "BMFR's fit": (
+        lambda y, x: bmfr_fit.fit(y, x, jnp.ones((*SIZE, 1), bool), 3, jnp.array([1, 2]), block=4),
+        (normal(*SIZE, 2), normal(*SIZE, 2)),
+    ),
+    "BMFR's TAA": (
+        lambda new, old, motion: bmfr_taa.smooth(
+            new, old, jnp.ones((*SIZE, 1), bool), motion / 5, 0.2
+        ),
+        (positive(*SIZE, 3), positive(*SIZE, 3), normal(*SIZE, 2)),
+    ),
+}
+
+
+def wall():
+    return Surface(jnp.ones((*SIZE, 3)) / 3**0.5, jnp.ones((*SIZE, 1)))
+
+
+def frame_of(**layers):
+    """A frame of `SIZE` with the given layers and made-up others."""
+    rng = np.random.default_rng(4)
+    others = {
+        "indirect": 0.3 + rng.random((*SIZE, 3)),
+        "albedo": 0.3 + rng.random((*SIZE, 3)),
+        "normal": [0, 0, 1] + rng.standard_normal((*SIZE, 3)) / 9,
+        "depth": 2 + rng.random((*SIZE, 1)),
+        "ao": rng.random((*SIZE, 1)),
+        "motion": np.zeros((*SIZE, 2)),
+    }
+    return Frame(**(jax.tree.map(jnp.asarray, others) | layers))
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_step(name):
+    agree(STEPS[name][0], *STEPS[name][1])
+
+
+def test_a_loss_whose_denominator_has_no_derivative():
+    picture, target = positive(*SIZE, 3), positive(*SIZE, 3)
+    with jax.enable_x64(True):
+        found = jax.grad(relative)(jnp.asarray(picture), jnp.asarray(target))
+    np.testing.assert_allclose(found, 2 * (picture - target) / (picture + 0.05) ** 2 / found.size)
+
+
+def next_of_shot(step, start, *options):
+    """The second frame of a shot by the light of both."""
+
+    def both(first, second):
+        frames = frame_of(indirect=first), frame_of(indirect=second)
+        state, _ = step(start(frames[0]), frames[0], *options)
+        return step(state, frames[1], *options)[1]
+
+    return both
+
+
+LIGHT = positive(*SIZE, 3)
+FRAMES = LIGHT, 1.1 * LIGHT + 0.1 * positive(*SIZE, 3)
+WHOLE = {
+    "adaptive FLR and its error": (
+        lambda y, x, p: flr_adaptive_with_error(y, x, p),
+        (positive(40, 48, 3), normal(40, 48, 2), ADAPTIVE_DEFAULT),
+    ),
+    "FLNR": (
+        lambda y, x, w: regression.flnr(y, x, w),
+        (positive(40, 48, 3), normal(40, 48, 5), regression.init(random.key(0), (4, 4))),
+    ),
+    "shots": (next_of_shot(sequence.step, sequence.start, "flr"), FRAMES),
+    "BMFR": (next_of_shot(bmfr.step, bmfr.start), FRAMES),
+}
+
+
+@pytest.mark.slow  # compiles long
+@pytest.mark.parametrize("name", WHOLE)
+def test_whole(name):
+    # Maxima have corners: a step must not reach the next one.
+    agree(*WHOLE[name][:1], *WHOLE[name][1], step=1e-6, forward_tolerance=1e-5)

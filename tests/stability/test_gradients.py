@@ -1,0 +1,65 @@
+"""Gradients by input and parameters are finite in every case of the atlas."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from experiments.stability import SIZE
+from experiments.stability.cases import CASES, make
+from jflnr.flnr.regression import flnr
+from jflnr.flnr.weights import shipped
+from jflnr.flr.adaptive import flr_adaptive
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.flr.parameters import DEFAULT
+from jflnr.flr.regression import flr
+from tests.gradients.directions import compiled
+
+FIVE_GUIDES = [case for case in CASES if "16" not in case]
+
+
+@functools.cache
+def gradient(method):
+    def mean(target, guides, parameters, usable, unit):
+        # Of the light relative to the input: of light near the type's maximum a derivative that is
+        # above 1 is beyond it.
+        light = method(target, guides, parameters, weight=usable) / unit
+        ramp = jnp.linspace(-1, 1, light.size).reshape(light.shape)
+        return jnp.mean(light * ramp)
+
+    return compiled(jax.grad(mean, argnums=(0, 1, 2)))
+
+
+def is_finite(method, case, parameters, channels):
+    made = make(case, *SIZE, np.float32)
+    arrays = made.target[..., channels], made.guides, jax.tree.map(np.float32, parameters)
+    unit = max(np.abs(made.target).max(), np.finfo(np.float32).tiny)
+    found = gradient(method)(*jax.tree.map(jnp.asarray, arrays), made.usable, unit)
+    for leaf in jax.tree.leaves(found):
+        assert np.isfinite(leaf).all()
+
+
+def wide_flr(*arguments, **options):
+    return flr(*arguments, support=96, **options)
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("case", CASES)
+def test_flr(case):
+    is_finite(wide_flr, case, DEFAULT, np.array([0, 1]))
+
+
+@pytest.mark.slow  # compiles long
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("case", FIVE_GUIDES)
+def test_flr_adaptive(case):
+    is_finite(flr_adaptive, case, ADAPTIVE_DEFAULT, np.array([0]))
+
+
+@pytest.mark.slow  # compiles long
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("case", FIVE_GUIDES)
+def test_flnr(case):
+    is_finite(flnr, case, shipped("flnr-tiny"), np.array([0, 0, 0]))
