@@ -70,7 +70,8 @@ def typical_depth(depth: Array, mask: Array | None) -> jax.Array:
 def layers(frame: Frame, names: Sequence[str], scene: Scene | None = None) -> tuple[Any, ...]:
     """The guides as separate layers `(H, W, C)`, free of the scene's unit of length.
 
-    Depth is divided by its median over the mask; so is the position, about a point of the scene.
+    Without guides, one layer of no channels. Depth is divided by its median over the mask; so is
+    the position, about a point of the scene.
     scene: of the frame that this one is a part of; the frame's own if None.
     """
     scene = scene_of(frame) if scene is None else scene
@@ -81,7 +82,8 @@ def layers(frame: Frame, names: Sequence[str], scene: Scene | None = None) -> tu
     if "position" in chosen:
         # Regularisation grows with a guide's distance from zero, and the origin means nothing.
         chosen["position"] = (chosen["position"] - scene.middle) * scale
-    return tuple(chosen[name] for name in names)
+    none = jnp.zeros((*frame.depth.shape[:2], 0), jnp.float32)
+    return tuple(chosen[name] for name in names) or (none,)
 
 
 def shrink(image: Array, factor: int, mask: Array | None = None) -> jax.Array:

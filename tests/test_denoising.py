@@ -41,6 +41,12 @@ def test_result_is_float32_of_the_frames_size(frame):
     assert out.shape == frame.indirect.shape and out.dtype == np.float32
 
 
+@pytest.mark.parametrize("method", ["flr", "auto"])
+def test_without_guides_it_is_a_blur(frame, method):
+    image = np.asarray(jflnr.denoise(frame, method, guides=()))
+    assert np.isfinite(image).all() and np.std(image) < 0.5 * np.std(frame.indirect)
+
+
 def test_light_groups_add_up_and_come_out_in_order(frame):
     half = frame.indirect * np.float32(0.25)
     groups = np.concatenate([frame.indirect - half, half], axis=-1)

@@ -24,6 +24,8 @@ def check_regression(
     checks.image("target", target)
     if target.shape[2] == 0:
         raise ValueError(f"target needs at least one channel; its shape is {target.shape}")
+    if not jax.tree.leaves(guides):
+        raise ValueError("guides must be an array (H, W, Q) or several; Q may be 0 for none")
     for layer in jax.tree.leaves(guides):
         checks.image("guides", layer)
         checks.same_size(target=target, guides=layer)
