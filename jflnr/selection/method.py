@@ -123,7 +123,7 @@ def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
     """The models of the form that `form` begins with."""
     block = COLLECTED[form]
     images, collected = _collect(frame, names, block)
-    groups = tuple(layer.shape[-1] for layer in images["guides"])
+    groups = tuple(layer.shape[-1] for layer in images["guides"] if layer.shape[-1])
     # What a shift does on blocks of 8 pixels, whole models do in the forms with smaller ones.
     shifted = form == "blocks-16"
     models, unfinished = fit(collected, groups, block, shifted)
