@@ -94,12 +94,14 @@ def prepare(
     factor = restoring_factor(steps[-1].merged, moments, shift.size, numbers.slack)
     x = features.of_steps(steps, shift.size, mean, None)
     known = prepared(x, coarsest, steps, factor, mean)
-    differences = tuple(unit * difference for difference in known.differences)
     # Without light there is none for the gain to act on, either.
     lit = jnp.sum(moments[index_xy(0, 0, shift.size, 1)]) > 0
-    mean = jnp.where(lit, unit * mean, 0)
-    own = {"coarsest": unit * known.coarsest, "differences": differences, "mean": mean}
-    return known._replace(**own), shift
+    known = known._replace(
+        coarsest=unit * known.coarsest,
+        differences=tuple(unit * difference for difference in known.differences),
+        mean=jnp.where(lit, unit * mean, 0),
+    )
+    return known, shift
 
 
 def prepared(

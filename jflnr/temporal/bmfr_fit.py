@@ -94,6 +94,8 @@ def scaled_features(features: jax.Array, surface: jax.Array, squares: int) -> ja
     """
 
     def to_unit(t: jax.Array, least: float) -> jax.Array:
+        # Halved, since the range between the type's extremes is beyond it.
+        t, least = t / 2, least / 2
         low = jnp.min(jnp.where(surface, t, jnp.inf), axis=1, keepdims=True)
         high = jnp.max(jnp.where(surface, t, -jnp.inf), axis=1, keepdims=True)
         varies = high - low > least
