@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from PIL import Image
+
 from experiments.render import frame
 from experiments.render.dataset import Job, fill
 from experiments.render.sheet import contact_sheet, tone_mapped
@@ -18,5 +20,6 @@ def run(arguments: argparse.Namespace) -> None:
     paths = {job.scene: arguments.folder / job.name for job in jobs}
     pictures = [(n, tone_mapped(frame.read(p)[0])) for n, p in paths.items() if p.exists()]
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    contact_sheet(pictures, 4).save(arguments.output)
+    page = contact_sheet(pictures, 4).quantize(256, dither=Image.Dither.NONE)  # a third of the size
+    page.save(arguments.output, optimize=True)
     print(f"wrote {arguments.output}")
