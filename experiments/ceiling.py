@@ -14,10 +14,11 @@ import jflnr
 from experiments import data, resume
 from jflnr import exr
 from jflnr.selection.method import denoise_on_blocks
+from jflnr.selection.plan import COLLECTED
 
 # Sides in pixels of the squares over which errors are averaged before they are ranked.
 SIDES = (8, 16, 32, 64)
-# Side in pixels of the blocks, and the form of method auto that has models of such.
+# Side in pixels of the smallest squares, and the form of method auto whose models are that large.
 BLOCK, FORM = 8, "blocks-8"
 # Noisy layers of 1 sample per pixel, each from its own random stream; every third scene is used.
 DRAWS = ("indirect_1", "indirect_1_b", "indirect_1_c")
@@ -42,7 +43,7 @@ def true_and_told(frame: jflnr.Frame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     off = ((np.asarray(image) - np.asarray(frame.reference)) @ weights) ** 2
     inside = np.ones_like(off) if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
     true, used = (pool(part * 1.0, BLOCK) for part in (off, inside))
-    told = np.asarray(models.error, np.float64)
+    told = pool(np.asarray(models.error, np.float64), BLOCK // COLLECTED[FORM])
     return true, told[: true.shape[0], : true.shape[1]], used > 0.99
 
 

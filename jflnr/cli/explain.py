@@ -11,6 +11,7 @@ from jflnr.files import replacing
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
+    from jflnr.selection.plan import Plan
 
 # From a constant to the model with all guides; also told apart without colour, by brightness.
 COLOURS = np.array([[20, 20, 60], [40, 100, 150], [70, 170, 130], [250, 230, 90]])
@@ -21,16 +22,16 @@ def explain(path: Path, frame: "Frame", guides: Sequence[str] | None) -> list[st
     from jflnr.selection.method import plan_of
 
     plan = plan_of(frame, guides)
-    write_map(path, plan.order, frame.depth.shape[:2], plan.groups)
+    write_map(path, plan, frame.depth.shape[:2])
     return [*plan.lines(), f"map of the orders: {path}"]
 
 
-def write_map(path: Path, order: np.ndarray, size: Sequence[int], groups: int) -> None:
-    """Orders `(h, w)` of blocks, 0 to `groups`, as colours at `size` (H, W)."""
-    place = np.clip(order / max(groups, 1), 0, 1) * (len(COLOURS) - 1)
+def write_map(path: Path, plan: "Plan", size: Sequence[int]) -> None:
+    """The orders of the plan's blocks as colours, at `size` (H, W)."""
+    place = np.clip(plan.order / max(plan.groups, 1), 0, 1) * (len(COLOURS) - 1)
     channels = [np.interp(place, range(len(COLOURS)), colour) for colour in COLOURS.T]
     picture = Image.fromarray(np.round(np.stack(channels, -1)).astype(np.uint8))
-    side = 8
-    whole = picture.resize((picture.width * side, picture.height * side), Image.Resampling.NEAREST)
+    whole = (picture.width * plan.side, picture.height * plan.side)
+    enlarged = picture.resize(whole, Image.Resampling.NEAREST)
     with replacing(path) as beside:
-        whole.crop((0, 0, size[1], size[0])).save(beside, format="PNG")
+        enlarged.crop((0, 0, size[1], size[0])).save(beside, format="PNG")

@@ -2,8 +2,9 @@
 
 The moments of the frame are collected once. Everything else happens on blocks: weights from a first
 fit, a pyramid of window widths, on every grid the average of all orders of model (`nested.py`), and
-from each finer grid as much of the difference as is signal. The finest grid can be left for later,
-when it is known whether it is worth its time. docs/select.md derives the steps.
+from each finer grid as much of the difference as is signal. On the finest grid the models are first
+only shifted; whole ones can follow, when it is known whether they are worth their time.
+docs/select.md derives the steps.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from jflnr.flr.widths import guide_features
 from jflnr.flr.window import gather, window_over
 from jflnr.selection.collected import Collected, inside
 from jflnr.selection.nested import fit_orders
-from jflnr.selection.weights import weighted
+from jflnr.selection.weights import weigh, weighted
 
 # Side in pixels of the coarsest blocks.
 COARSEST = 64
@@ -84,27 +85,25 @@ class Progress(NamedTuple):
 
 
 class Unfinished(NamedTuple):
-    """What the finest grid needs: weighted moments of the blocks collected, and the progress."""
+    """What the finest grid needs: weights and squares of `weigh`, and the progress so far."""
 
-    moments: jax.Array
-    noise: jax.Array
+    weights: jax.Array
+    squares: jax.Array
     progress: Progress
 
 
-@functools.partial(jax.jit, static_argnames=("groups", "block", "shifted"))
-def fit(
-    collected: Collected, groups: tuple[int, ...], block: int, shifted: bool = False
-) -> tuple[Models, Unfinished]:
-    """Fit models of blocks twice as large as those collected. Compiled once per size of the grid.
+@functools.partial(jax.jit, static_argnames=("groups", "block"))
+def fit(collected: Collected, groups: tuple[int, ...], block: int) -> tuple[Models, Unfinished]:
+    """Fit models of blocks twice as large as those collected, and shift them on these.
 
-    groups: numbers of guides that enter together, in order. block: side in pixels of the blocks
-    collected, a power of two below half of `COARSEST`. shifted: add one grid, that of the blocks
-    collected, on which the models are shifted but keep their slopes.
+    Compiled once per size of the grid. groups: numbers of guides that enter together, in order.
+    block: side in pixels of the blocks collected, a power of two below half of `COARSEST`.
     """
     numbers = SETTINGS.numbers()
     light = collected.light()
     mean = frame_mean(light, collected.shift.size)
-    finest = weighted(collected, light, mean, block, numbers)
+    weights, squares = weigh(collected, light, mean, block, numbers)
+    finest = weighted(collected, weights, squares, block)
     grids = [finest]
     while grids[-1].block < COARSEST:
         last = grids[-1]
@@ -112,9 +111,7 @@ def fit(
     progress = _widest(grids.pop(), collected, groups, mean, numbers)
     for number, grid in enumerate(reversed(grids[1:]), 1):
         progress = _refined(progress, grid, number, collected, groups, numbers)
-    unfinished = Unfinished(finest.moments, finest.noise, progress)
-    if not shifted:
-        return _models(progress, halve(halve(light)), collected, groups, numbers), unfinished
+    unfinished = Unfinished(weights, squares, progress)
     progress = _refined(progress, finest, number + 1, collected, groups, numbers, shifted=True)
     return _models(progress, halve(light), collected, groups, numbers), unfinished
 
@@ -123,9 +120,9 @@ def fit(
 def refine(
     collected: Collected, unfinished: Unfinished, groups: tuple[int, ...], block: int
 ) -> Models:
-    """Models of the blocks collected, from what `fit` left; arguments as there."""
+    """Whole models of the blocks collected, from what `fit` left; arguments as there."""
     numbers = SETTINGS.numbers()
-    grid = Grid(unfinished.moments, unfinished.noise, block)
+    grid = weighted(collected, unfinished.weights, unfinished.squares, block)
     number = (COARSEST // block).bit_length() - 1
     progress = _refined(unfinished.progress, grid, number, collected, groups, numbers)
     return _models(progress, halve(collected.light()), collected, groups, numbers)
@@ -142,8 +139,6 @@ def _models(
     count = collected.shift.size
     coefficients = restore(progress.merged, light, count, numbers.slack)
     moments = collected.moments[: index_xy(0, 0, count, 0)]
-    if moments.shape[1:] != coefficients.shape[2:]:
-        moments = halve(moments)
     done = inside(coefficients, moments, groups)
     error = VARIANCE * progress.variance + LEFT_OUT * progress.left_out
     error += DETAIL * progress.level**2 + INSIDE * jnp.sum(done, axis=0)

@@ -32,7 +32,8 @@ def edges(frame: Frame) -> float:
         np.asarray(layer[STEP // 2 :: STEP, STEP // 2 :: STEP], np.float32)
         for layer in (frame.normal, frame.depth)
     )
-    found = [_ends(normal, depth, axis) for axis in (0, 1)]
+    with np.errstate(invalid="ignore", over="ignore"):  # pixels that are not finite are edges
+        found = [_ends(normal, depth, axis) for axis in (0, 1)]
     count = sum(part.size for part in found)
     return float(sum(part.sum() for part in found)) / max(count, 1)
 
@@ -44,4 +45,4 @@ def _ends(normal: np.ndarray, depth: np.ndarray, axis: int) -> np.ndarray:
     first[axis], last[axis] = slice(None, -1), slice(1, None)
     here, there = depth[tuple(first)][..., 0], depth[tuple(last)][..., 0]
     turn = np.linalg.norm(normal[tuple(last)] - normal[tuple(first)], axis=-1)
-    return (turn > TURN) | (np.abs(there - here) > GAP * np.minimum(here, there))
+    return ~(turn <= TURN) | ~(np.abs(there - here) <= GAP * np.minimum(here, there))

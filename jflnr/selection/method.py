@@ -23,10 +23,6 @@ from jflnr.selection.blocks import SETTINGS, Models, Unfinished, fit, refine
 from jflnr.selection.collected import Collected, collect_frame, hold
 from jflnr.selection.glance import is_simple
 
-# Sides in pixels of the blocks that a form collects, and of those that its image is made from.
-COLLECTED = {"blocks-16": 8, "blocks-8": 4, "blocks-4": 4}
-EVALUATED = {"blocks-16": 8, "blocks-8": 8, "blocks-4": 4}
-
 
 def select(
     frame: Frame,
@@ -64,7 +60,7 @@ def select_inputs(
         from jflnr.denoising import denoise
 
         return plan, denoise(frame, plan.form, guides=names, keep_energy=keep_energy)
-    if COLLECTED[plan.form] != fitted.block:
+    if plans.COLLECTED[plan.form] != fitted.block:
         fitted = _fitted(frame, names, plan.form)
     models = _finished(fitted, plan.form)
     plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
@@ -121,12 +117,10 @@ def _planned(
 
 def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
     """The models of the form that `form` begins with."""
-    block = COLLECTED[form]
+    block = plans.COLLECTED[form]
     images, collected = _collect(frame, names, block)
     groups = tuple(layer.shape[-1] for layer in images["guides"] if layer.shape[-1])
-    # What a shift does on blocks of 8 pixels, whole models do in the forms with smaller ones.
-    shifted = form == "blocks-16"
-    models, unfinished = fit(collected, groups, block, shifted)
+    models, unfinished = fit(collected, groups, block)
     return Fitted(images, collected, models, unfinished, groups, block)
 
 
@@ -141,7 +135,7 @@ def _image(
     fitted: Fitted, models: Models, form: str, used: tuple[int, ...], keep_energy: bool
 ) -> Array:
     shift, unit = fitted.collected.shift, fitted.collected.unit
-    return _apply(fitted.images, models, shift, unit, used, EVALUATED[form], keep_energy)
+    return _apply(fitted.images, models, shift, unit, used, plans.COLLECTED[form], keep_energy)
 
 
 @functools.partial(jax.jit, static_argnames=("names", "block"))

@@ -20,15 +20,17 @@ from jflnr.selection.blocks import Models
 MEAN_BRIGHTNESS, GAMMA = 0.35, 2.2
 
 # From the smallest to the largest. Those of `blocks.py` are named after their whole models.
-BLOCKS = ("blocks-16", "blocks-8", "blocks-4")
+# Side in pixels of the blocks that they collect, on which their images are evaluated.
+COLLECTED = {"blocks-16": 8, "blocks-8": 4, "blocks-4": 4}
+BLOCKS = tuple(COLLECTED)
 FORMS = (*BLOCKS, "flnr")
 # Time per pixel, in that of plain FLR with five guides.
-COSTS = dict(zip(FORMS, (0.8, 1.4, 2.0, 4.4), strict=True))
+COSTS = dict(zip(FORMS, (1.1, 1.9, 3.0, 4.4), strict=True))
 # What looking at a frame by a form has cost when a larger one is taken after all that does not
 # go on from it.
-LOOKS = {"blocks-16": 0.5, "blocks-8": 1.1}
+LOOKS = {"blocks-16": 0.8, "blocks-8": 1.6}
 # Decibels that a form must bring for each further FLR of time.
-PRICE = 0.15
+PRICE = 0.1
 # A guide is read at every pixel if inside blocks it does more than this share of the squared error.
 WORTH = 1e-4
 
@@ -66,9 +68,9 @@ PREDICTIONS = {
         "flnr": (16.02, 0.05307, -2.947, -0.3786, 1.335, 3.292),
     },
     "blocks-8": {
-        "blocks-8": (15.35, 0.06418, -0.2432, -0.3683, 1.854, 2.181),
-        "blocks-4": (15.2, 0.06822, 0.498, -0.384, 1.708, 2.343),
-        "flnr": (16.02, 0.05332, -0.06263, -0.3377, 1.84, 2.306),
+        "blocks-8": (14.37, 0.05676, 3.609, -0.6215, 3.954, 0.7923),
+        "blocks-4": (14.39, 0.05754, 4.048, -0.6295, 3.939, 0.8223),
+        "flnr": (14.31, 0.05894, 4.478, -0.6443, 3.977, 0.8568),
     },
 }
 
@@ -80,7 +82,7 @@ class Plan:
     form: one of FORMS. guides: those used. decibels: predicted PSNR of every form. cost: predicted
     time of every form in that of plain FLR. milliseconds: on this device, of the chosen form; None
     unless it was asked for. order: `(h, w)`, how many of the `groups` of guides are in use, by
-    blocks of 8 pixels.
+    blocks of `side` pixels.
     """
 
     form: str
@@ -89,6 +91,7 @@ class Plan:
     cost: Mapping[str, float]
     milliseconds: float | None
     order: np.ndarray
+    side: int
     groups: int
 
     def lines(self) -> list[str]:
@@ -185,7 +188,7 @@ def plan(
         ms = {form: 1e3 * limits.seconds * pixels * c for form, c in cost.items()}
     form = choose(_open(first, decibels, limits), cost, ms, limits.budget_ms, limits.target_db)
     time = None if ms is None else ms[form]
-    return Plan(form, names, decibels, cost, time, order, len(names))
+    return Plan(form, names, decibels, cost, time, order, COLLECTED[first], len(names))
 
 
 def _open(first: str, decibels: Mapping[str, float], limits: Limits) -> dict[str, float]:

@@ -17,14 +17,14 @@ from jflnr.selection.collected import Collected
 FIRST = 16
 
 
-def weighted(
+def weigh(
     collected: Collected,
     light: jax.Array,
     mean: jax.Array,
     block: int,
     numbers: AdaptiveParameters,
-) -> Grid:
-    """The blocks that were collected, weighed.
+) -> tuple[jax.Array, jax.Array]:
+    """Weights `(h, w)` of the blocks, and the mean squares `(1, h, w)` of what the fit leaves.
 
     light: moments of the brightness. mean: brightness of the frame. block: side in pixels of the
     blocks of `collected`.
@@ -35,8 +35,12 @@ def weighted(
     squares = squared_residual(light, collected.squares, pilot[:, 0])
     # The floor is there for the derivative of the power at 0.
     relative = jnp.maximum(level / mean, 1e-6)
-    weights = 1 / (relative**numbers.exponent + numbers.offset)
-    return Grid(collected.moments * weights, (squares * weights**2)[None], block)
+    return 1 / (relative**numbers.exponent + numbers.offset), squares[None]
+
+
+def weighted(collected: Collected, weights: jax.Array, squares: jax.Array, block: int) -> Grid:
+    """The blocks with their weights, from `weigh`."""
+    return Grid(collected.moments * weights, squares * weights**2, block)
 
 
 def _first_fit(

@@ -23,7 +23,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Plan:
     order[:, 3:] = 3
     decibels = {"blocks-8": 25.0, "blocks-4": 25.5}
     cost = {"blocks-8": 1.0, "blocks-4": 1.5}
-    plan = Plan("blocks-8", ("normal", "ao"), decibels, cost, 12.0, order, 3)
+    plan = Plan("blocks-8", ("normal", "ao"), decibels, cost, 12.0, order, 8, 3)
     monkeypatch.setattr(method, "plan_of", lambda *arguments: plan)
     monkeypatch.setattr(denoising, "denoise", lambda frame, **settings: 0.5 * frame.indirect)
     return plan
