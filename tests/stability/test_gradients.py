@@ -46,9 +46,15 @@ def wide_flr(*arguments, **options):
 
 
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", FIVE_GUIDES)
 def test_flr(case):
     is_finite(wide_flr, case, DEFAULT, np.array([0, 1]))
+
+
+@pytest.mark.slow  # compiles long
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+def test_flr_of_16_guides():
+    is_finite(wide_flr, "16 guides, rank 5", DEFAULT, np.array([0, 1]))
 
 
 @pytest.mark.slow  # compiles long
