@@ -46,10 +46,10 @@ def test_energy_is_kept_if_asked_for(frame):
 
 def test_blends_without_seams(rng):
     """Where the order of the models changes, the image does not jump at the blocks' borders."""
-    height, width = 128, 192
+    height, width = 64, 1024
     y, x = np.mgrid[:height, :width].astype(np.float32)[..., None] / 32
-    # Half of the frame knows no ambient occlusion, the other half is lit by nothing else.
-    ao = np.clip(x - 3, 0, 1) * (0.5 + 0.5 * np.sin(6 * y))
+    # No window of the left part reaches the ambient occlusion, which the light of the right follows.
+    ao = np.clip(x - 24, 0, 1) * (0.5 + 0.5 * np.sin(6 * y))
     noise = rng.gamma(4, 1 / 4, size=(height, width, 1))
     light = np.broadcast_to((0.5 + ao) * noise, (height, width, 3)).astype(np.float32)
     flat = np.broadcast_to(np.float32([0, 0, 1]), (height, width, 3))
