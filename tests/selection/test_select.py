@@ -48,7 +48,7 @@ def test_blends_without_seams(rng):
     """Where the order of the models changes, the image does not jump at the blocks' borders."""
     height, width = 64, 1024
     y, x = np.mgrid[:height, :width].astype(np.float32)[..., None] / 32
-    # No window of the left part reaches the ambient occlusion, which the light of the right follows.
+    # No window of the left part reaches the ambient occlusion, which lights the right part.
     ao = np.clip(x - 24, 0, 1) * (0.5 + 0.5 * np.sin(6 * y))
     noise = rng.gamma(4, 1 / 4, size=(height, width, 1))
     light = np.broadcast_to((0.5 + ao) * noise, (height, width, 3)).astype(np.float32)
