@@ -10,7 +10,7 @@
 // multiplied by max(1 + rate * restored, 0) first, `restored` being (ceil(h / 2), restored_pitch), a
 // number for each 2 x 2 models (adaptive FLR, energy.cl). The models then lie as in models.h, and no
 // pixel is darker than `least` times the light of its block, `own` of floor.cl: as much of that is
-// mixed in, into all channels alike.
+// mixed in, into all channels alike, if there is any.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -126,7 +126,8 @@ kernel void apply(
             light += BRIGHTNESS(c) * values[c];
             whole += BRIGHTNESS(c) * BLOCK_LIGHT(c);
         }
-        const real share = MAX(least * whole - light, 0) / MAX(whole - light, 1e-18f);
+        const real missing = MAX(least * whole - light, 0);
+        const real share = whole > 0 ? missing / MAX(whole - light, 1e-18f) : (real)0;
 #pragma unroll
         for (int c = 0; c < C; ++c) values[c] += share * (BLOCK_LIGHT(c) - values[c]);
 #endif

@@ -31,7 +31,8 @@ def lift(
 ) -> list[jax.Array]:
     """Mix in as much of the block's own light that the brightness is `floor` times its brightness.
 
-    All channels are mixed by one share, so that light groups go on summing to the whole.
+    All channels are mixed by one share, so that light groups go on summing to the whole. Where a
+    block has no light of its own nothing is mixed in.
 
     channels, own: images, one for each channel.
     """
@@ -44,5 +45,5 @@ def lift(
     )
     # Squared, as its derivative does, the divisor must not vanish.
     share = jnp.maximum(floor * whole - light, 0) / jnp.maximum(whole - light, 1e-18)
-    share = lax.optimization_barrier(share)
+    share = lax.optimization_barrier(share * (whole > 0))
     return [c + share * (o - c) for c, o in zip(channels, own, strict=True)]

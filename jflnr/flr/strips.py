@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 from jax import lax
@@ -43,6 +44,6 @@ def fill(
     return add(whole, array, rest) if rest else array
 
 
-def cut(images: jax.Array, first: jax.Array | int, rows: int) -> jax.Array:
+def cut(images: Any, first: jax.Array | int, rows: int) -> Any:
     """Some rows of every image `(H, W, ...)` of a pytree."""
     return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows), images)

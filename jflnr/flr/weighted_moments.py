@@ -30,7 +30,8 @@ def collect_weighted(
     """
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
-        return _strip(*cut((target, guides, weight, squares), first, rows), shift, block)
+        y, x, w, r = cut((target, guides, weight, squares), first, rows)
+        return _strip(y, x, w, r, shift, block)
 
     height, width = (-(-size // block) for size in target.shape[:2])
     count = plane_count(shift.size, target.shape[2]) + 1
