@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -57,7 +58,7 @@ def step(
     context = default_context() if context is None else context
     names, inputs = prepared(state, frame, method, guides)
     parameters, temporal = parameters_of(method, parameters), temporal or Temporal()
-    smooth = lambda *layers: noisy_guides.smooth_guide(*layers, context)
+    smooth = functools.partial(noisy_guides.smooth_guide, context=context)
     layers = to_layers(context, adaptive_images(inputs, names, smooth=smooth)["guides"])
     sample, motion = (to_device(context, layer) for layer in (frame.indirect, frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
@@ -71,9 +72,9 @@ def step(
     light, weight = accumulate(context, light, change, sample, covered, least[0])
     fitted = _fit(context, light.mean, layers, weight, parameters, method)
     image, _ = accumulate(context, image, change, fitted, covered, least[1])
-    following = State(surface, light, image, evidence)
-    context.finish(image.mean, image.mean)
-    return following, image.mean if on_device else image.mean.get()
+    result: Any = image.mean
+    context.finish(result, result)
+    return State(surface, light, image, evidence), result if on_device else result.get()
 
 
 def reproject(
