@@ -61,9 +61,9 @@ def ours() -> list[Method]:
     """`jflnr.denoise`, every method on every backend that is there."""
     found = []
     for backend in backends():
-        # The kernels are those of plain FLR. BMFR is a peer.
-        names = [method for method in jflnr.METHODS if method != "bmfr"]
-        for method in names if backend == "jax" else ("flr",):
+        # BMFR is a peer, and auto has no kernels.
+        without = ("bmfr",) if backend == "jax" else ("bmfr", "auto")
+        for method in (name for name in jflnr.METHODS if name not in without):
             name = method if backend == "jax" else f"{method} ({backend})"
             parameters = {"method": method, "backend": backend}
             found.append(Method(name, "jflnr", jflnr.denoise, parameters, backend == "jax"))
