@@ -1,8 +1,11 @@
 """What tests share: where the real frames are, and a small made-up one."""
 
+import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 
@@ -12,6 +15,20 @@ from jflnr.frame import Frame, write_frame
 def pytest_configure(config: pytest.Config) -> None:
     # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
     config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_programs() -> Iterator[None]:
+    """Forget compiled programs when there are many.
+
+    Each takes some mappings of memory, of which Linux lets a process have 65 530; the compiler
+    crashes without a word when it gets no more.
+    """
+    yield
+    mappings = Path("/proc/self/maps")
+    if mappings.exists() and mappings.read_bytes().count(b"\n") > 20_000:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(scope="session")
