@@ -33,6 +33,7 @@ def example(rng):
         coarsest=coefficients[3],
         differences=(coefficients[2], coefficients[1], coefficients[0]),
         shares=tuple(rng.uniform(size=grid) for grid in GRIDS[2::-1]),
+        guides=np.concatenate([np.ones((1, *GRIDS[0])), 0.1 * noise(GUIDES, *GRIDS[0])]),
         factor=rng.uniform(0.9, 1.1, GRIDS[0]),
         mean=np.array(1.3),
     )
