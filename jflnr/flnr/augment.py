@@ -55,11 +55,10 @@ def _mirror(example: Example, axis: int, mirrored: jax.Array) -> Example:
 
     example = _with_planes(example, planes, image)
     known = example.prepared
-    coarsest, differences, shares, factor = jax.tree.map(planes, known[1:-1])
+    # All but what the network reads and the brightness of the frame.
+    flipped = jax.tree.map(planes, known[1:-1])
     return example._replace(
-        prepared=known._replace(
-            coarsest=coarsest, differences=differences, shares=shares, factor=factor
-        ),
+        prepared=type(known)(known.x, *flipped, known.mean),
         guides=image(example.guides),
         albedo=image(example.albedo),
         target=image(example.target),
