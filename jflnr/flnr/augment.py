@@ -56,9 +56,9 @@ def _mirror(example: Example, axis: int, mirrored: jax.Array) -> Example:
     example = _with_planes(example, planes, image)
     known = example.prepared
     # All but what the network reads and the brightness of the frame.
-    flipped = jax.tree.map(planes, known[1:-1])
+    flipped = dict(zip(known._fields[1:-1], jax.tree.map(planes, known[1:-1]), strict=True))
     return example._replace(
-        prepared=type(known)(known.x, *flipped, known.mean),
+        prepared=known._replace(**flipped),
         guides=image(example.guides),
         albedo=image(example.albedo),
         target=image(example.target),
