@@ -11,6 +11,7 @@ import numpy as np
 import jflnr
 from experiments import data, noise, plots, results, resume
 from experiments.methods import oidn_peers
+from experiments.spp import means
 from jflnr import flnr
 from jflnr.frame import Frame
 from jflnr.metrics import measure
@@ -35,7 +36,9 @@ def run(quick: bool) -> dict[str, Any]:
         return [
             {"frame": label, "spp": spp} | row
             for spp in counts
-            for row in rows_of(dataclasses.replace(frame, indirect=noisy[f"indirect_{spp}"]))
+            for row in rows_of(
+                without_lamps(dataclasses.replace(frame, indirect=noisy[f"indirect_{spp}"]))
+            )
         ]
 
     found = resume.rows(f"{NAME}{'-quick' * quick}", [str(path) for path in paths], on_frame)
@@ -43,22 +46,20 @@ def run(quick: bool) -> dict[str, Any]:
     return {"means": means(frames), "frames": frames}
 
 
+def without_lamps(frame: Frame) -> Frame:
+    """No light on lamps: the frames of the data folder store some there, our renderer none."""
+    dark = ~np.any(np.asarray(frame.emission) > 0, axis=-1, keepdims=True)
+    names = ("indirect", "reference", "reference_a")
+    lights = {name: getattr(frame, name) for name in names}
+    kept = {name: a * dark for name, a in lights.items() if a is not None}
+    return dataclasses.replace(frame, **kept)
+
+
 def rows_of(frame: Frame) -> list[dict[str, Any]]:
     """Metrics of every method on one frame."""
     images = {method: np.asarray(jflnr.denoise(frame, method)) for method in METHODS}
     images |= {peer.name: peer(frame) for peer in oidn_peers() if peer.name == OIDN}
     return [{"method": name} | measure(frame, image) for name, image in images.items()]
-
-
-def means(frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The mean over frames for each method and number of samples."""
-    keys = dict.fromkeys((row["method"], row["spp"]) for row in frames)
-    found = []
-    for method, spp in keys:
-        mine = [row for row in frames if (row["method"], row["spp"]) == (method, spp)]
-        values = {k: float(np.mean([row[k] for row in mine])) for k in METRICS}
-        found.append({"method": method, "spp": spp} | values)
-    return found
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:

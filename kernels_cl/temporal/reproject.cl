@@ -38,13 +38,7 @@ kernel void reproject(
     const long pixel = (long)y * width + x;
     const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
     Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
-    Surface here;
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-        here.normal[c] = OWN(normal, 3, c);
-        here.position[c] = OWN(position, 3, c);
-    }
-    here.depth = READ(depth + pixel);
+    const Surface here = surface_here(normal, depth, position, pixel);
     const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
     const real tolerance = (off_plane + moved) * here.depth;
 #pragma unroll

@@ -23,6 +23,20 @@ INLINE Surface surface_at(
     return found;
 }
 
+// Of the work-item's own pixels.
+INLINE Surface surface_here(
+    global const float *normal, global const float *depth, global const float *position, long pixel)
+{
+    Surface found;
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+        found.normal[c] = OWN(normal, 3, c);
+        found.position[c] = OWN(position, 3, c);
+    }
+    found.depth = READ(depth + pixel);
+    return found;
+}
+
 // Whether two pixels show one surface. tolerance: in scene units.
 INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal)
 {
