@@ -93,14 +93,9 @@ kernel void merge(
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
-    fine += AT(x, y, pitch, MODELS);
-    merged += AT(x, y, pitch, MODELS);
-    const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
-    const coarse_t before = coarse_at(coarse_merged, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
     const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
     const real part = doubled(&share_at, 0);
-    for (int k = 0; k < VARIANCE; ++k) {
-        const real step = READ(fine + k * GROUP) - doubled(&at, k);
-        WRITE(doubled(&before, k) + part * step, merged + k * GROUP);
-    }
+    merge_models(
+        VARIANCE, x, y, pitch, coarse_h, coarse_w, coarse_pitch, fine, coarse, coarse_merged, part,
+        merged);
 }
