@@ -21,7 +21,7 @@ from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
 from jflnr.flr.floor import with_own_light
 from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
-from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude
+from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude, planes
 from jflnr.flr.pyramid import halve
 from jflnr.flr.weighted_moments import collect_weighted
 from jflnr.flr.widths import Step, fit_levels, guide_features, merged_models
@@ -86,7 +86,7 @@ def flr_adaptive(
     models = fit_frame(target, guides, parameters, block, levels, weight)
     image = image_of(models, guides, parameters.numbers())
     if keep_energy:
-        image = rescale(image, light_of(target / models.unit), weight)
+        image = rescale(image, light_of(target, models.unit), weight)
     return image * models.unit
 
 
@@ -104,12 +104,11 @@ def fit_frame(
     numbers = parameters.numbers()
     shift = centre(guides)
     unit = magnitude(target)
-    target = target / unit
     block = max(block // 2, 1)
-    moments = collect_light(target, guides, shift, weight, block)
+    moments = collect_light(target, guides, shift, weight, block, unit)
     mean = frame_mean(moments, shift.size)
     pilot = Pilot(with_borders(fit_pilot(moments, mean, shift, numbers, block)), mean)
-    grid = collect_grid(target, guides, shift, pilot, weight, numbers, block)
+    grid = collect_grid(target, guides, shift, pilot, weight, numbers, block, unit)
     coarsest, steps = fit_levels(grid, shift, target.shape[-1], levels, mean, numbers)
     coefficients = restore(merged_models(coarsest, steps), moments, shift.size, numbers.slack)
     return Fitted(coefficients, grid, coarsest, steps, shift, mean, unit)
@@ -122,16 +121,25 @@ def image_of(models: Fitted, guides: Guides, numbers: AdaptiveParameters) -> jax
     return apply(coefficients, guides, models.shift, models.grid.block, numbers.floor)
 
 
-def light_of(target: jax.Array) -> jax.Array:
-    """Brightness of the pixels, `(H, W, C)` to `(H, W)`."""
-    return jnp.einsum("hwc,c->hw", target, brightness(target.shape[-1], target.dtype))
+def light_of(target: jax.Array, unit: jax.Array | float = 1) -> jax.Array:
+    """Brightness of the pixels over `unit`, `(H, W, C)` to `(H, W)`."""
+    weights = brightness(target.shape[-1], target.dtype)
+    return sum(
+        (w * (plane / unit) for w, plane in zip(weights, planes(target), strict=True)),
+        jnp.zeros(target.shape[:2], target.dtype),
+    )
 
 
 def collect_light(
-    target: jax.Array, guides: Guides, shift: jax.Array, weight: jax.Array | None, block: int
+    target: jax.Array,
+    guides: Guides,
+    shift: jax.Array,
+    weight: jax.Array | None,
+    block: int,
+    unit: jax.Array | float = 1,
 ) -> jax.Array:
-    """Pass 1: unweighted moments of the brightness, on blocks twice as large as `block`."""
-    return collect(light_of(target)[..., None], guides, shift, 2 * block, weight)
+    """Pass 1: unweighted moments of the brightness over `unit`, on blocks of twice `block`."""
+    return collect(light_of(target, unit)[..., None], guides, shift, 2 * block, weight)
 
 
 def frame_mean(moments: jax.Array, guides: int) -> jax.Array:
@@ -158,12 +166,13 @@ def collect_grid(
     weight: jax.Array | None,
     numbers: AdaptiveParameters,
     block: int,
+    unit: jax.Array | float = 1,
 ) -> Grid:
-    """Pass 2: moments of the weighted pixels on the finest blocks."""
+    """Pass 2: moments of the weighted pixels on the finest blocks, of the light over `unit`."""
     expected = apply_rows(pilot.coefficients, guides, shift, 4 * block)[..., 0]
-    light = light_of(target)
+    light = light_of(target, unit)
     weights, squares = _weights(light, guides, expected, pilot.mean, weight, numbers)
-    return Grid(*collect_weighted(target, guides, shift, weights, squares, block), block)
+    return Grid(*collect_weighted(target, guides, shift, weights, squares, block, unit), block)
 
 
 def _weights(

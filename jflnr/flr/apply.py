@@ -11,6 +11,10 @@ from jflnr.flr.floor import lift
 from jflnr.flr.moments import Guides, from_shift, planes
 from jflnr.flr.strips import cut, fill, step_of
 
+# Rows of pixels that are worked on at a time: so many that the compiler divides the last step among
+# the cores. A floor needs more of the cache.
+ROWS = 64
+
 
 def apply(
     coefficients: jax.Array,
@@ -59,7 +63,7 @@ def apply_rows(
         return apply_strip(cut(guides, first, rows), models, shift, block, floor)
 
     image = jnp.zeros((height, width, coefficients.shape[1]), coefficients.dtype)
-    return fill(image, 0, height, 1, step_of(block), strip)
+    return fill(image, 0, height, 1, step_of(block, ROWS if floor is None else ROWS // 2), strip)
 
 
 def apply_strip(
@@ -76,11 +80,11 @@ def apply_strip(
     """
     rows, width = jax.tree.leaves(guides)[0].shape[:2]
     dtype, count = coefficients.dtype, coefficients.shape[2] - 2
+    coefficients = jnp.pad(coefficients, ((0, 0), (0, 0), (0, 0), (1, 1)), mode="edge")
     above, here, below = (coefficients[:, :, k : k + count, None] for k in range(3))
     before, centre, after = (jnp.asarray(f, dtype)[:, None] for f in _hat(block))
     models = before * above + centre * here + after * below
-    models = models.reshape(*models.shape[:2], count * block, -1)[:, :, :rows]
-    edges = jnp.concatenate([models[..., :1], models, models[..., -1:]], axis=-1)
+    edges = models.reshape(*models.shape[:2], count * block, -1)[:, :, :rows]
 
     margin = block - block // 2
     cells = edges.shape[-1] - 1
@@ -96,21 +100,18 @@ def apply_strip(
     # Cheap to keep in the cache, dear to compute once per pixel and channel.
     start, difference, x = lax.optimization_barrier((edges[..., :-1], jnp.diff(edges), x))
 
-    def interpolated(row: int, channel: int) -> jax.Array:
-        return start[row, channel, ..., None] + t * difference[row, channel, ..., None]
+    def pixels(values: jax.Array) -> jax.Array:
+        return values.reshape(*values.shape[:2], -1)[..., margin : margin + width]
 
-    channels = []
-    for c in range(coefficients.shape[1]):
-        at_start, change = start[0, c, ..., None], difference[0, c, ..., None]
-        for q, guide in enumerate(x):
-            at_start += guide * start[q + 1, c, ..., None]
-            change += guide * difference[q + 1, c, ..., None]
-        channels.append(at_start + t * change)
+    at_start, change = start[0, ..., None], difference[0, ..., None]
+    for q, guide in enumerate(x):
+        at_start += guide * start[q + 1, ..., None]
+        change += guide * difference[q + 1, ..., None]
+    channels = pixels(at_start + t * change)
     if floor is not None:
-        own = [interpolated(-1, c) for c in range(len(channels))]
+        own = pixels(start[-1, ..., None] + t * difference[-1, ..., None])
         channels = lift(channels, own, floor)
-    values = [value.reshape(rows, -1)[:, margin : margin + width] for value in channels]
-    return jnp.stack(lax.optimization_barrier(values), axis=-1)
+    return jnp.stack(list(channels), axis=-1)
 
 
 def _hat(block: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

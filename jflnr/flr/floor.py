@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
-from jax import lax
 
 from jflnr.flr.level import brightness
 
@@ -26,24 +25,16 @@ def with_own_light(coefficients: jax.Array, guides: jax.Array) -> jax.Array:
     return jnp.concatenate([coefficients, own[None]])
 
 
-def lift(
-    channels: list[jax.Array], own: list[jax.Array], floor: jax.Array | float
-) -> list[jax.Array]:
+def lift(channels: jax.Array, own: jax.Array, floor: jax.Array | float) -> jax.Array:
     """Mix in as much of the block's own light that the brightness is `floor` times its brightness.
 
     All channels are mixed by one share, so that light groups go on summing to the whole. Where a
     block has no light of its own nothing is mixed in.
 
-    channels, own: images, one for each channel.
+    channels, own: `(C, H, W)`. Returns the same.
     """
-    # The barriers: computed together, all this takes several times as long.
-    channels, own = lax.optimization_barrier((channels, own))
-    weights = brightness(len(channels), channels[0].dtype)
-    light, whole = (
-        lax.optimization_barrier(sum(w * plane for w, plane in zip(weights, image, strict=True)))
-        for image in (channels, own)
-    )
+    weights = brightness(len(channels), channels.dtype)[:, None, None]
+    light, whole = jnp.sum(weights * channels, axis=0), jnp.sum(weights * own, axis=0)
     # Squared, as its derivative does, the divisor must not vanish.
     share = jnp.maximum(floor * whole - light, 0) / jnp.maximum(whole - light, 1e-18)
-    share = lax.optimization_barrier(share * (whole > 0))
-    return [c + share * (o - c) for c, o in zip(channels, own, strict=True)]
+    return channels + share * (whole > 0) * (own - channels)

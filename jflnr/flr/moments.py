@@ -15,6 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from jflnr.flr.strips import cut, fill
+
 # One array `(H, W, Q)`, or several that make up the Q channels together, so that the layers of a
 # frame need not be copied into one.
 Guides: TypeAlias = jax.Array | tuple[jax.Array, ...]
@@ -115,27 +117,22 @@ def collect(
     one more plane, the last.
     Returns `(K, ceil(H/block), ceil(W/block))`.
     """
-    rows = target.shape[0] // block
-    inputs = (target, guides, weight)
-
-    def strip(arrays: tuple[jax.Array, Guides, jax.Array | None]) -> jax.Array:
-        return _strip_moments(*arrays, shift=shift, block=block, brightness=brightness)
-
+    height, width = (-(-size // block) for size in target.shape[:2])
+    count = plane_count(shift.size, target.shape[2]) + (brightness is not None)
+    whole = target.shape[0] // block
     # 24 rows of pixels stay in the cache while their products are formed, and keep cores busy;
     # where they do not divide the frame, fewer: a second program for the rest would compile longer.
-    strips = jax.tree.map(lambda a: into_strips(a, block), inputs)
-    together = max(k for k in range(1, max(24 // block, 1) + 1) if rows % k == 0)
-    moments = lax.map(strip, strips, batch_size=together)
-    if target.shape[0] % block:
-        rest = strip(jax.tree.map(lambda a: a[rows * block :], inputs))
-        moments = jnp.concatenate([moments, rest[None]])
-    return jnp.moveaxis(moments, 0, 1)
+    together = max(k for k in range(1, max(24 // block, 1) + 1) if whole % k == 0)
 
+    def strip(first: jax.Array | int, rows: int) -> jax.Array:
+        images = cut((target, guides, weight), first, rows)
+        side = min(rows, block)
+        lines = jax.tree.map(lambda a: a.reshape(rows // side, side, *a.shape[1:]), images)
+        make = functools.partial(_strip_moments, shift=shift, block=block, brightness=brightness)
+        return jnp.moveaxis(jax.vmap(make)(*lines), 0, 1)
 
-def into_strips(image: jax.Array, block: int) -> jax.Array:
-    """`(H, W, ...)` to `(H // block, block, W, ...)`."""
-    rows = image.shape[0] // block
-    return image[: rows * block].reshape(rows, block, *image.shape[1:])
+    empty = jnp.zeros((count, height, width), working_type(target, *jax.tree.leaves(guides)))
+    return fill(empty, 1, target.shape[0], block, together * block, strip)
 
 
 def _strip_moments(

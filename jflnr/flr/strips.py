@@ -12,9 +12,9 @@ from jax import lax
 ROWS = 16
 
 
-def step_of(block: int) -> int:
-    """About `ROWS` rows of pixels, in whole rows of blocks."""
-    return max(ROWS // block, 1) * block
+def step_of(block: int, rows: int = ROWS) -> int:
+    """About so many rows of pixels, in whole rows of blocks."""
+    return max(rows // block, 1) * block
 
 
 def fill(

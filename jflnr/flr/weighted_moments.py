@@ -21,17 +21,19 @@ def collect_weighted(
     weight: jax.Array,
     squares: jax.Array,
     block: int,
+    unit: jax.Array | float = 1,
 ) -> tuple[jax.Array, jax.Array]:
     """Mean over each block of the weighted outer products of [1, X - shift, Y], and of `squares`.
 
     target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`. weight: `(H, W)`, finite and not
-    negative, 0 where a pixel is not to be used. squares: `(H, W)`, finite.
+    negative, 0 where a pixel is not to be used. squares: `(H, W)`, finite. unit: what the target is
+    divided by.
     Returns `(K, ceil(H/block), ceil(W/block))` and `(1, ceil(H/block), ceil(W/block))`.
     """
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
         y, x, w, r = cut((target, guides, weight, squares), first, rows)
-        return _strip(y, x, w, r, shift, block)
+        return _strip(y / unit, x, w, r, shift, block)
 
     height, width = (-(-size // block) for size in target.shape[:2])
     count = plane_count(shift.size, target.shape[2]) + 1
