@@ -28,10 +28,11 @@ ROWS = 64
 
 
 class Known(NamedTuple):
-    """What the network takes from the whole frame: its mean brightness, how much brightness is
-    given back (`energy.rate`), and `features.light_means`, `(2,)`."""
+    """What the network takes from the whole frame: its mean brightness, whether there is light, how
+    much brightness is given back (`energy.rate`), and `features.light_means`, `(2,)`."""
 
     mean: jax.Array
+    lit: bool
     rate: jax.Array
     means: jax.Array
 
@@ -53,7 +54,7 @@ def correct(
     scales = sum(name.startswith("encode") and name[-1].isdigit() for name in params)
     # Six blocks of the coarsest scale, each twice the finest, are more than all convolutions reach.
     reach = REACH + 6 * 2**scales
-    known = Known(mean, rate, _means(job, moments, models, mean))
+    known = Known(mean, output.any(), rate, _means(job, moments, models, mean))
     for across, along in job.tiles(job.block, reach, max(ALIGN, 2**scales)):
         y, x = across.on(2), along.on(2)
         given = jnp.asarray(output[y.outer, x.outer])
@@ -93,5 +94,7 @@ def _models(
     )
     factor = energy.scale(jnp.ones((1, 1, *moments.shape[1:])), output, known.rate)[0, 0]
     x = features.of_steps(steps, guides, known.mean, tuple(known.means))
-    frame = regression.prepared(x, coarsest, steps, factor, known.mean)
+    # Without light there is none for the gain to act on, either.
+    mean = jnp.where(known.lit, known.mean, 0)
+    frame = regression.prepared(x, coarsest, steps, factor, mean)
     return with_own_light(regression.finish(params, frame), frame.guides)

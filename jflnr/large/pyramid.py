@@ -21,12 +21,12 @@ import numpy as np
 
 from jflnr.flr import adaptive, energy
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.moments import index_xy, plane_count
+from jflnr.flr.moments import centre, index_xy, magnitude, plane_count
 from jflnr.large import steps
 from jflnr.large.local import Strip
 from jflnr.large.pieces import Piece, pieces
 from jflnr.large.planes import Planes
-from jflnr.large.source import Rows, read_with_neighbours, scene_of, shift_of
+from jflnr.large.source import Rows, read_with_neighbours, scene_of, sparse
 from jflnr.large.steps import Common
 
 # How far a model looks, in finest blocks. On each of four levels: 5 blocks of its window over fits
@@ -91,8 +91,8 @@ def strips(
     folder: for temporary files. network: puts other models in the place of those fitted.
     """
     scene = scene_of(rows)
-    shift = shift_of(rows, lambda frame: steps.guides_of(frame, names, scene))
-    common = Common(scene, shift, parameters.numbers())
+    layers, target = sparse(rows, lambda frame: steps.images_of(frame, names, scene))
+    common = Common(scene, centre(layers), magnitude(target), parameters.numbers())
     # Strips do not overlap, so small ones cost nothing.
     finest, height = max(block // 2, 1), max(tile * tile // (4 * rows.width), 1)
     job = Job(rows, common, names, finest, height, tile, folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -75,9 +76,17 @@ def shift_of(rows: Rows, images: Callable[[Frame], tuple[Guides, jax.Array | Non
 
     images: the guides and the weight of a frame; of three rows the middle one counts.
     """
+    return centre(*sparse(rows, images))
+
+
+def sparse(rows: Rows, images: Callable[[Frame], Any]) -> Any:
+    """What is made of the few rows of a frame that typical values are told from, `(n, W, ...)`.
+
+    images: of three rows the middle one counts.
+    """
     step = max(rows.height // 32, 1)
     found = [
         jax.tree.map(lambda a: a[1:2], images(read_with_neighbours(rows, row, row + 1)))
         for row in range(0, rows.height, step)
     ]
-    return centre(*jax.tree.map(lambda *lines: jnp.concatenate(lines), *found))
+    return jax.tree.map(lambda *lines: jnp.concatenate(lines), *found)

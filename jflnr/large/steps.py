@@ -23,19 +23,24 @@ _on_blocks = functools.partial(jax.jit, static_argnames=("channels", "block"))
 
 
 class Common(NamedTuple):
-    """What all parts of a frame share. shift: `(Q,)`. numbers: the constants themselves."""
+    """What all parts of a frame share.
+
+    shift: `(Q,)`. unit: what the light is divided by. numbers: the constants themselves.
+    """
 
     scene: guide_layers.Scene
     shift: jax.Array
+    unit: jax.Array
     numbers: AdaptiveParameters
 
 
 @functools.partial(jax.jit, static_argnames="names")
-def guides_of(
+def images_of(
     frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene
-) -> tuple[Guides, None]:
-    """The guides of a frame; no weight, since `flr_adaptive` centres them without."""
-    return adaptive_images(frame, names, scene)["guides"], None
+) -> tuple[Guides, jax.Array]:
+    """The guides and the light of a frame."""
+    images = adaptive_images(frame, names, scene)
+    return images["guides"], images["target"]
 
 
 @_on_pixels
@@ -43,7 +48,7 @@ def light_of_strip(strip: Frame, common: Common, names: tuple[str, ...], block: 
     """Pass 1: moments of the brightness on blocks twice as large as `block`, `(K, h/2, w/2)`."""
     images = _images(strip, common, names)
     return adaptive.collect_light(
-        images["target"], images["guides"], common.shift, images["weight"], block
+        images["target"], images["guides"], common.shift, images["weight"], block, common.unit
     )
 
 
@@ -67,6 +72,7 @@ def moments_of_strip(
         images["weight"],
         common.numbers,
         block,
+        common.unit,
     )
     return jnp.concatenate([grid.moments, grid.noise])
 
@@ -98,7 +104,7 @@ def image_of_strip(
 ) -> jax.Array:
     """Pass 3: the denoised light `(H, W, C)`. models: `(Q + 2, C, h + 2, w)`."""
     guides = _images(strip, common, names)["guides"]
-    return apply_rows(models, guides, common.shift, block, common.numbers.floor)
+    return common.unit * apply_rows(models, guides, common.shift, block, common.numbers.floor)
 
 
 def _images(strip: Frame, common: Common, names: tuple[str, ...]) -> dict:

@@ -54,9 +54,7 @@ def flr_adaptive(
     checks.positive_integer("levels", levels)
     check_counts(channel_count(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
-    pixels = to_image(target)
-    unit = _unit(pixels)
-    pixels = pixels if unit == 1 else pixels / unit
+    pixels, unit = in_unit(target)
     images = context.array(pixels), to_layers(context, guides)
     counts = to_weight(context, weight)
     image = context.empty(target.shape) if keep_energy else output
@@ -68,14 +66,21 @@ def flr_adaptive(
     return context.finish(output, result)
 
 
-def _unit(pixels: Any) -> np.float32:
-    """What the light is divided by, from a sparse grid; 1 where it is on the device already."""
+def in_unit(target: Any) -> tuple[Any, np.float32]:
+    """The light, divided by what follows if it is so bright that its squares overflow.
+
+    Told from a sparse grid; 1 where the light is on the device already.
+    """
+    pixels = to_image(target)
     if is_device_array(pixels):
-        return np.float32(1)
+        return pixels, np.float32(1)
     rows, columns = (slice(None, None, max(size // 32, 1)) for size in pixels.shape[:2])
     sample = np.abs(pixels[rows, columns])
     largest = float(np.max(sample, where=np.isfinite(sample), initial=0))
-    return np.float32(2.0 ** (math.frexp(largest)[1] - 1) if largest > BRIGHT else 1)
+    if largest <= BRIGHT:
+        return pixels, np.float32(1)
+    unit = np.float32(2.0 ** (math.frexp(largest)[1] - 1))
+    return pixels / unit, unit
 
 
 def _denoise(

@@ -13,9 +13,9 @@ from jflnr.flr.adaptive import LEVELS
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.arguments import channel_count, check_regression
 from jflnr.opencl import network_features, network_unet
-from jflnr.opencl.adaptive import fit_pilot
+from jflnr.opencl.adaptive import fit_pilot, in_unit
 from jflnr.opencl.apply import Restored, apply
-from jflnr.opencl.arguments import to_image, to_layers, to_output, to_weight
+from jflnr.opencl.arguments import to_layers, to_output, to_weight
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
@@ -60,7 +60,8 @@ def flnr(
             f"training; got {counts[0]} and {counts[1]}"
         )
     output, result = to_output(context, target.shape, out, on_device)
-    images = context.array(to_image(target)), to_layers(context, guides)
+    pixels, unit = in_unit(target)
+    images = context.array(pixels), to_layers(context, guides)
     weight = to_weight(context, weight)
     image = context.empty(target.shape) if keep_energy else output
     frame = prepare(context, *images, weight)
@@ -72,6 +73,8 @@ def flnr(
     apply(context, models.planes, images[1], shift, BLOCK, sizes, image, restored)
     if keep_energy:
         rescale(context, image, images[0], weight, output)
+    if unit != 1:
+        output *= unit
     return context.finish(output, result)
 
 

@@ -65,7 +65,8 @@ INLINE real unpacked(global const float *said, int said_pitch, int x, int y, int
 
 // The finest level, whose models are scaled by max(1 + rate * restored, 0), a number for each 2 x 2
 // of them (energy.cl), and then by the gain. It acts on a little light even where the models predict
-// none. Global size (pitch / WIDTH, h).
+// none, unless the frame has none. mean: of the frame, and its sum over blocks (energy.cl). Global
+// size (pitch / WIDTH, h).
 #define FACTOR(i) MAX(1 + rate[0] * restored[(x + (i)) / 2], 0)
 kernel void finish(
     int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, int said_pitch,
@@ -84,7 +85,7 @@ kernel void finish(
     const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
     const real part = changed(doubled(&share_at, 0), unpacked(said, said_pitch, x, y, 0));
     const real factor = LANES(real, FACTOR);
-    const float dark = DARK * mean[0];
+    const float dark = mean[1] > 0 ? DARK * mean[0] : 0;
     for (int c = 0; c < C; ++c) {
         const real gain = exp_of(within(unpacked(said, said_pitch, x, y, 1 + c), LARGEST_GAIN));
         for (int q = 0; q <= Q; ++q) {

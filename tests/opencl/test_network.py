@@ -155,10 +155,16 @@ def test_energy_is_kept(context: Context) -> None:
 def test_no_light(context: Context) -> None:
     """Nothing is made of nothing, whatever the network says."""
     target, guides = scene(*SIZE, 5, 3)
-    params = shipped("flnr-tiny")
-    assert np.isfinite(flnr(np.zeros_like(target), guides, params, context=context)).all()
-    nothing = np.full_like(target, np.nan)
-    assert np.isfinite(flnr(nothing, guides, params, context=context)).all()
+    for value in (0, np.nan):
+        nothing = np.full_like(target, value)
+        assert not flnr(nothing, guides, outspoken((4, 5, 6)), context=context).any()
+
+
+def test_light_whose_squares_overflow(context: Context) -> None:
+    target, guides = scene(*SIZE, 5, 3)
+    unit, params = np.float32(2**120), shipped("flnr-tiny")
+    plain, found = (flnr(u * target, guides, params, context=context) for u in (1, unit))
+    assert error(found / unit, plain) < tolerances.ADAPTIVE
 
 
 def test_result_on_the_device_and_in_half(context: Context, gpu_like: Context) -> None:
