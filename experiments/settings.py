@@ -18,7 +18,7 @@ GUIDES = (("normal", "depth"), ("normal", "depth", "ao", "position"))
 
 def flr_settings() -> list[Method]:
     """Block, guides, sigma, precision, on every backend; the default itself is left out."""
-    options: dict[str, dict[str, Any]] = {f"block {b}": {"block": b} for b in (2, 4, 16, 32)}
+    options: dict[str, dict[str, Any]] = {f"block {b}": {"block": b} for b in (1, 2, 4, 16, 32)}
     options |= {f"guides {'+'.join(names)}": {"guides": names} for names in GUIDES}
     for sigma in (8.0, 24.0):
         changed = Parameters.of(sigma, float(DEFAULT.eps), float(DEFAULT.eps_prime))

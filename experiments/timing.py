@@ -8,7 +8,7 @@ import jflnr
 from experiments.methods import Method
 from experiments.speed import interleaved
 
-REPEATS = 5
+REPEATS = 15
 
 
 def times(methods: Sequence[Method], frame: jflnr.Frame, quick: bool) -> dict[str, float]:
