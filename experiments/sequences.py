@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from experiments import plots, results, resume, shots
 from jflnr import temporal_metrics
@@ -211,6 +212,9 @@ def chart(
                     found = np.array(values(row), float)
                     axis.plot(found, style[0], color=style[1], label=row["method"])
             axis.set(title=name.replace("_", ", "), yscale=scale)
+            axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+            # Those between powers of ten would overlap.
+            axis.yaxis.set_minor_formatter(NullFormatter())
         for axis in panels[len(names) :]:
             axis.remove()
         panels[0].set_ylabel(label)

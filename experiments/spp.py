@@ -24,6 +24,8 @@ STREAMS = {"1": (1,), "4": (4,), "5": (1, 4), "16": (16,), "20": (4, 16)}
 PEERS = ("guided filter, tuned", "SVGF, spatial, tuned", "BMFR, one frame, tuned", "OIDN, tuned")
 SIGMAS = (4.0, 6.0, 8.0, 11.0, 15.0, 20.0)
 METRICS = ("psnr", "ssim", "flip", "rmse")
+# Of the table, not in the chart: far below it, or on top of another line.
+LEFT_OUT = ("noisy", "bmfr", "flnr-tiny", "flnr-small")
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -92,7 +94,7 @@ def draw(result: dict[str, Any], folder: Path) -> None:
         for axis, metric, label in zip(
             axes, ("psnr", "flip"), ("PSNR, dB", "FLIP (less is better)"), strict=True
         ):
-            for number, method in enumerate(m for m in methods if m != "noisy"):
+            for number, method in enumerate(m for m in methods if m not in LEFT_OUT):
                 mine = sorted(
                     (row for row in result["means"] if row["method"] == method),
                     key=lambda row: row["spp"],
