@@ -12,6 +12,8 @@ from jflnr.frame import Array, Frame
 
 DEFAULT = ("normal", "depth", "ao")
 NAMES = ("normal", "depth", "ao", "position", "albedo")
+# Median depths. Of training's frames with depths beyond, the best of 3 and 4.
+FAR = 3
 
 
 def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
@@ -84,6 +86,17 @@ def layers(frame: Frame, names: Sequence[str], scene: Scene | None = None) -> tu
         chosen["position"] = (chosen["position"] - scene.middle) * scale
     none = jnp.zeros((*frame.depth.shape[:2], 0), jnp.float32)
     return tuple(chosen[name] for name in names) or (none,)
+
+
+@jax.jit
+def draw_near(depth: Array) -> jax.Array:
+    """Depth over its median, bent beyond `FAR` so that none exceeds `FAR + 1`.
+
+    Where a room is seen into the open through a slit, the models of the blocks around, which know
+    nothing so far away, would be extrapolated and leave bright streaks.
+    """
+    beyond = jnp.maximum(depth - FAR, 0)
+    return jnp.minimum(depth, FAR) + beyond / (1 + beyond)
 
 
 def shrink(image: Array, factor: int, mask: Array | None = None) -> jax.Array:

@@ -88,15 +88,17 @@ def adaptive_images(
     scene: guide_layers.Scene | None = None,
     smooth: Callable[..., Array] = smooth_guide,
 ) -> dict[str, Any]:
-    """The images that `flr_adaptive` takes, ambient occlusion without its noise.
+    """The images that `flr_adaptive` takes: far depths drawn near, ambient occlusion without noise.
 
     scene: of the frame that this one is a part of; the frame's own if None. smooth: what takes the
     noise from a guide, given the normal and the depth.
     """
     images = flr_images(frame, names, scene)
-    if "ao" in names:
-        layers = list(images["guides"])
-        ao = names.index("ao")
-        layers[ao] = smooth(layers[ao], frame.normal, frame.depth)
-        images["guides"] = tuple(layers)
+    layers = dict(zip(names, images["guides"], strict=False))
+    if "depth" in layers:
+        layers["depth"] = guide_layers.draw_near(layers["depth"])
+    if "ao" in layers:
+        layers["ao"] = smooth(layers["ao"], frame.normal, frame.depth)
+    # Without names there is one layer of no channels.
+    images["guides"] = tuple(layers.values()) or images["guides"]
     return images

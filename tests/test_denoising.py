@@ -135,3 +135,19 @@ def test_the_adaptive_method_is_better_on_the_shipped_frame():
 def test_parameters_of_another_method_are_refused(frame):
     with pytest.raises(TypeError, match="parameters must be AdaptiveParameters"):
         jflnr.denoise(frame, "flr-adaptive", parameters=jflnr.Parameters.of(8, 1e-3, 1e-3))
+
+
+def test_a_slit_into_the_open_is_no_bright_streak(rng):
+    """Black pixels far behind a wall that brightens with its depth."""
+    y, x = np.mgrid[:64, :96].astype(np.float32)[..., None]
+    depth, slit = 1 + x / 96 + y / 64, (x >= 47) & (x < 49) & (y > 20) & (y < 44)
+    light = (depth - 0.8) * np.ones(3, np.float32)
+    frame = jflnr.Frame(
+        indirect=np.where(slit, 0, light * rng.exponential(size=light.shape)).astype(np.float32),
+        albedo=np.ones((64, 96, 3), np.float32),
+        normal=np.tile(np.float32([0, 0, 1]), (64, 96, 1)),
+        depth=np.where(slit, 60, depth),
+        ao=np.ones_like(depth),
+    )
+    out = np.asarray(jflnr.denoise(frame, "flr-adaptive"))
+    assert out[slit[..., 0]].max() < light.max()
