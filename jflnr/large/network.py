@@ -54,7 +54,7 @@ def correct(
     scales = sum(name.startswith("encode") and name[-1].isdigit() for name in params)
     # Six blocks of the coarsest scale, each twice the finest, are more than all convolutions reach.
     reach = REACH + 6 * 2**scales
-    known = Known(mean, output.any(), rate, _means(job, moments, models, mean))
+    known = Known(mean, bool(output.any()), rate, _means(job, moments, models, mean))
     for across, along in job.tiles(job.block, reach, max(ALIGN, 2**scales)):
         y, x = across.on(2), along.on(2)
         given = jnp.asarray(output[y.outer, x.outer])
