@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,11 @@ from jflnr.frame import Array, Frame
 from jflnr.guides import NAMES
 
 NAME = "guide_choice"
-QUESTION = "Which guides matter for FLR, in which order, and what does each cost?"
+QUESTION = "Which guides matter for FLR and FLNR, in which order, and what does each cost?"
+
+# FLNR takes these three always: what they are worth is what is lost without one.
+LEFT_OUT = ("normal", "depth", "ao")
+METHODS = ("flr", "flr-adaptive", "flnr")
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -56,7 +61,25 @@ def run(quick: bool) -> dict[str, Any]:
     clock = times(methods, test[0], quick)
     for step in steps[1:]:
         step["ms"] = clock[step["guides"]]
-    return {"steps": steps, "tried": tried}
+    keys = [f"{method}|{name}" for method in METHODS for name in ("", *LEFT_OUT)]
+
+    def left_out(key: str) -> dict[str, Any]:
+        method, name = key.split("|")
+        parameters = {"method": method, "name": name}
+        psnr = [mean_psnr(frames, without, parameters) for frames in (choice, test)]
+        return {"method": method, "without": name} | dict(zip(("val", "test"), psnr, strict=True))
+
+    missing = resume.rows(f"{NAME}-missing{tag}", keys, left_out)
+    return {"steps": steps, "tried": tried, "missing": missing}
+
+
+def without(frame: Frame, *, method: str, name: str) -> Array:
+    """A method on a frame of which one guide, if named, is the same everywhere."""
+    if name:
+        layer = np.asarray(getattr(frame, name))
+        same = np.broadcast_to(np.mean(layer, axis=(0, 1), dtype=layer.dtype), layer.shape)
+        frame = dataclasses.replace(frame, **{name: np.ascontiguousarray(same)})
+    return jflnr.denoise(frame, method)
 
 
 def guided_by(frame: Frame, *, guides: Sequence[str]) -> Array:
@@ -72,10 +95,12 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     """guide_choice.png: PSNR and time as guides are added; guide_choice.md: all that was tried."""
     steps = result["steps"]
     columns = {"added": "added", "val": "PSNR, val", "test": "PSNR, test", "ms": "ms, 640 x 360"}
-    tried = results.table(
-        result["tried"], {"guides": "guides", "val": "PSNR, val", "test": "PSNR, test"}
+    psnr = {"val": "PSNR, val", "test": "PSNR, test"}
+    tried = results.table(result["tried"], {"guides": "guides"} | psnr)
+    missing = results.table(result["missing"], {"method": "method", "without": "without"} | psnr)
+    plots.write_text(
+        folder / f"{NAME}.md", "\n".join([results.table(steps, columns), tried, missing])
     )
-    plots.write_text(folder / f"{NAME}.md", results.table(steps, columns) + "\n" + tried)
     labels = [steps[0]["added"], *(f"+ {step['added']}" for step in steps[1:])]
     with plots.figure(folder / f"{NAME}.png", columns=2) as (left, right):
         places = range(len(steps))
