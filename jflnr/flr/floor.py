@@ -34,6 +34,7 @@ def lift(channels: jax.Array, own: jax.Array, floor: jax.Array | float) -> jax.A
     channels, own: `(C, H, W)`. Returns the same.
     """
     weights = brightness(len(channels), channels.dtype)[:, None, None]
+    # Sums along an axis: plane by plane, the compiler would find the light for every channel anew.
     light, whole = jnp.sum(weights * channels, axis=0), jnp.sum(weights * own, axis=0)
     # Squared, as its derivative does, the divisor must not vanish.
     share = jnp.maximum(floor * whole - light, 0) / jnp.maximum(whole - light, 1e-18)
