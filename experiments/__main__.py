@@ -56,7 +56,8 @@ def main(argv: list[str]) -> int:
             return _on_cluster(arguments, names)
         for name in names:
             if arguments.command == "list":
-                print(f"{name:16}{_module(name).QUESTION}")
+                module = _module(name)
+                print(f"{name:16}{module.MINUTES:4} min  {module.QUESTION}")
             elif arguments.command == "run":
                 results.run(_module(name), arguments.quick, arguments.out)
                 results.draw(_module(name), arguments.out, arguments.docs)
@@ -95,7 +96,7 @@ def _module(name: str) -> results.Experiment:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m experiments", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("list", help="the experiments and their questions")
+    commands.add_parser("list", help="the experiments: minutes on two cores, question")
     run = commands.add_parser("run", help="run experiments by name, or all")
     run.add_argument("names", nargs="+", metavar="NAME")
     run.add_argument("--quick", action="store_true", help="a small version, in under a minute")

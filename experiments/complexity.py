@@ -19,6 +19,7 @@ from jflnr.temporal import bmfr_fit
 
 NAME = "complexity"
 QUESTION = "How does time grow with the number of guides and with pixels, ours and BMFR's?"
+MINUTES = 4
 
 LABELS = {"flr": "FLR, block 8", "bmfr": "BMFR, 32 x 32", "guided": "guided filter, radius 24"}
 

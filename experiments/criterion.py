@@ -20,6 +20,7 @@ from jflnr.inputs import flr_images
 
 NAME = "criterion"
 QUESTION = "Which criterion tells best, without a reference, how wrong a local model is?"
+MINUTES = 10
 
 NAMES = ("normal", "depth", "ao")
 SIGMAS = (8, 16, 32)

@@ -14,6 +14,7 @@ from experiments.ablation import has
 
 NAME = "error_map"
 QUESTION = "Are 90 % of the pixels within the 90 % interval, and is the error where the map says?"
+MINUTES = 3
 
 COUNTS = (1, 4, 16)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

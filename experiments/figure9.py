@@ -18,6 +18,7 @@ from jflnr.metrics import compare, display, exposure
 
 NAME = "figure9"
 QUESTION = "What do the methods look like where they differ most?"
+MINUTES = 1
 
 SIZE = 96
 PEERS = ("guided filter, tuned", "SVGF, spatial, tuned", "BMFR, one frame, tuned", "OIDN, tuned")

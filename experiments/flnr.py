@@ -18,6 +18,7 @@ from jflnr.metrics import display, exposure, measure
 
 NAME = "flnr"
 QUESTION = "What does the network add, frame by frame, and what does it cost?"
+MINUTES = 2
 
 COLUMNS = PICTURE | {"energy": "energy", "ms": "ms, 640 x 360"}
 SHOWN = ("noisy", "OIDN, tuned", "flr-adaptive", "flnr", "reference")

@@ -18,6 +18,7 @@ from jflnr.metrics import measure
 
 NAME = "flnr_spp"
 QUESTION = "Up to how many samples per pixel is FLNR better than FLR, adaptive FLR and OIDN?"
+MINUTES = 5
 
 COUNTS = (1, 2, 4, 8, 16, 32, 64)
 METHODS = ("flr", "flr-adaptive", *flnr.METHODS)

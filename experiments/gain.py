@@ -15,6 +15,7 @@ from jflnr.metrics import measure
 
 NAME = "gain"
 QUESTION = "How much better than the paper's Figure 3 is FLR, frame by frame?"
+MINUTES = 1
 
 KERNEL, STD, TIKHONOV = 41, 10.0, 1e-6
 

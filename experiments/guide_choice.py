@@ -22,6 +22,7 @@ from jflnr.guides import NAMES
 
 NAME = "guide_choice"
 QUESTION = "Which guides matter for FLR and FLNR, in which order, and what does each cost?"
+MINUTES = 2
 
 # FLNR takes these three always: what they are worth is what is lost without one.
 LEFT_OUT = ("normal", "depth", "ao")

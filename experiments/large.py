@@ -21,6 +21,7 @@ from jflnr.metrics import display, exposure
 
 NAME = "large"
 QUESTION = "What do large frames take, in memory and in time, whole and in pieces?"
+MINUTES = 18
 
 METHODS = ("flr", "flr-adaptive", "flnr")
 # Pixels of the frames whose memory is measured, and what they may take in pieces.

@@ -15,6 +15,7 @@ from jflnr.flnr.train import CONFIGS, Settings, Validation, rate_of
 
 NAME = "learning_curve"
 QUESTION = "What do more scenes to learn from bring the network?"
+MINUTES = 60
 
 SECONDS = 25.0
 SHARES = (0.25, 0.5, 1.0)

@@ -17,6 +17,7 @@ from jflnr.frame import Frame
 
 NAME = "lightgroups"
 QUESTION = "What do further light groups cost, and do they still sum to the whole?"
+MINUTES = 1
 
 # Of the OpenCL kernels: 9 channels.
 MOST = {"jax": 8, "opencl": 3}

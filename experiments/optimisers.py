@@ -17,6 +17,7 @@ from jflnr.flnr.train import CONFIGS, Settings, rate_of
 
 NAME = "optimisers"
 QUESTION = "Which optimiser of jaxopt trains the network best in equal time?"
+MINUTES = 60
 
 SECONDS = 25.0
 # Of frames and validation crops.

@@ -16,6 +16,7 @@ from experiments.tune import quick_psnr
 
 NAME = "pareto"
 QUESTION = "Which method and setting is the most accurate in a given time?"
+MINUTES = 4
 
 MARKS = {
     "jflnr": ("o", 0),

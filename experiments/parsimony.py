@@ -25,6 +25,7 @@ from jflnr.selection.plan import BLOCKS
 
 NAME = "parsimony"
 QUESTION = "Does method auto find the smallest model that is good enough, and what does it save?"
+MINUTES = 20
 
 # One view of one scene of every family, as `render data` makes them; they are training frames.
 FAMILIES = "*-[1-4]_100.exr"

@@ -16,6 +16,7 @@ from jflnr.metrics import display, exposure, measure
 NAME = "picture"
 METHODS = ("flr", "flr-adaptive", "flnr")
 QUESTION = "What does one sample per pixel look like before and after?"
+MINUTES = 1
 
 
 def run(quick: bool) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import json
 import platform
 import subprocess
 import sys
+import time
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,6 +25,7 @@ class Experiment(Protocol):
 
     NAME: str
     QUESTION: str
+    MINUTES: int  # that a whole run takes on two cores
 
     def run(self, quick: bool) -> dict[str, Any]:
         """The figures, as JSON values."""
@@ -34,8 +36,12 @@ class Experiment(Protocol):
 
 def run(experiment: Experiment, quick: bool, out: Path) -> None:
     """Run one experiment and write `OUT/NAME.json`."""
-    print(f"{experiment.NAME}: {experiment.QUESTION}")
-    evidence = {"environment": environment(), "quick": quick, "result": experiment.run(quick)}
+    long = "under a minute" if quick else f"about {experiment.MINUTES} min on two cores"
+    print(f"{experiment.NAME}: {experiment.QUESTION} ({long})", flush=True)
+    evidence: dict[str, Any] = {"environment": environment(), "quick": quick}
+    start = time.perf_counter()
+    evidence["result"] = experiment.run(quick)
+    evidence["environment"]["minutes"] = round((time.perf_counter() - start) / 60, 1)
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{experiment.NAME}.json"
     write_atomically(path, (json.dumps(evidence, indent=1) + "\n").encode())

@@ -22,6 +22,7 @@ from jflnr.temporal import bmfr, sequence
 
 NAME = "sequence_speed"
 QUESTION = "What does a frame with a history take, against BMFR and the memory floor?"
+MINUTES = 2
 
 WIDTH, HEIGHT = 1280, 720
 BMFR = {"per_bmfr": "BMFR, JAX", "per_kernels": "BMFR, OpenCL"}

@@ -24,6 +24,7 @@ from jflnr.opencl.profile import profile
 
 NAME = "speed"
 QUESTION = "How many times the memory floor does FLR take, and how much less than OIDN?"
+MINUTES = 7
 
 WIDTH, HEIGHT = 1920, 1080
 OIDN: dict[str, dict[str, Any]] = {

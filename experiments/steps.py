@@ -21,6 +21,7 @@ from jflnr.metrics import display, exposure
 
 NAME = "steps"
 QUESTION = "What does each step of FLR make of the shipped frame?"
+MINUTES = 1
 
 SUPPORT = 72
 

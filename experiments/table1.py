@@ -15,6 +15,7 @@ from jflnr.metrics import measure
 
 NAME = "table1"
 QUESTION = "How does every method do at one sample per pixel, in all metrics and in time?"
+MINUTES = 3
 
 METRICS = ("psnr", "ssim", "flip", "rmse", "smape", "mse", "mse_unbiased")
 PICTURE = {

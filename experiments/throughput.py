@@ -23,6 +23,7 @@ from jflnr.large import memory
 
 NAME = "throughput"
 QUESTION = "How many frames a second does a folder reach, by its parts and by workers?"
+MINUTES = 5
 
 CASES = (
     ("flr", "jax"),

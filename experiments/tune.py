@@ -18,6 +18,7 @@ from jflnr.metrics import display, exposure, psnr
 
 NAME = "tune"
 QUESTION = "Which parameters of the peers are best on the validation frames?"
+MINUTES = 20
 
 GUIDES = (("normal", "depth"), ("normal", "depth", "ao"))
 # Where the search starts, and the values that each parameter takes in turn.

@@ -16,6 +16,7 @@ from experiments.stability.methods import EXACT, METHODS, ON_DEVICE, OURS, TRUTH
 
 NAME = "stability"
 QUESTION = "On which inputs does which solver fail, and does ours on any?"
+MINUTES = 5
 
 SIZE = 36, 44  # pixels; blocks hang over both borders
 # Storage of the frame, and the arithmetic on it.
