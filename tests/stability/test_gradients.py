@@ -69,3 +69,18 @@ def test_flr_adaptive(case):
 @pytest.mark.parametrize("case", FIVE_GUIDES)
 def test_flnr(case):
     is_finite(flnr, case, shipped("flnr-tiny"), np.array([0, 0, 0]))
+
+
+@pytest.mark.parametrize("method", [wide_flr, flr_adaptive])
+def test_far_from_all_light(method):
+    """Windows that reach no usable pixel at all, as in a wide sky."""
+    made = make("ordinary", 16, 240, np.float32)
+    usable = np.arange(240) < 40
+    parameters = DEFAULT if method is wide_flr else ADAPTIVE_DEFAULT
+    arrays = made.target[..., :1], made.guides, jax.tree.map(np.float32, parameters)
+    weight = jnp.asarray(np.broadcast_to(usable, (16, 240)))
+    found = gradient(method)(*jax.tree.map(jnp.asarray, arrays), weight, 1)
+    for leaf in jax.tree.leaves(found):
+        assert np.isfinite(leaf).all()
+    assert np.any(found[0][:, usable])
+    np.testing.assert_array_equal(found[0][:, ~usable], 0)
