@@ -18,11 +18,11 @@ def measure(case: Case, result: np.ndarray, truth: np.ndarray, exact: np.ndarray
     result: `(H, W, 2)`, what the method makes of `case.target`. truth: the exact answer to the
     problem it solves. exact: that to ours (Eq. 18-23), the same for all methods.
 
-    not_finite: usable pixels, with noise or without. error: RMS from the noise-free light, over that
-    of `exact`. rounding: largest difference from `truth`, overshoot: by how much the result leaves the range of
-    the input, bias: RMS error of the mean over all noise; these three relative to the input's
-    range. bleeding: mean bias within 3 pixels of the step in the light, relative to the light's
-    range, or None.
+    not_finite: usable pixels, with noise or without. error: RMS from the noise-free light, over
+    that of `exact`. rounding: largest difference from `truth`, overshoot: by how much the result
+    leaves the range of the input, bias: RMS error of the mean over all noise; these three relative
+    to the input's range. bleeding: mean bias within 3 pixels of the step in the light, relative to
+    the light's range, or None.
     """
     target = case.target.astype(np.float64)[case.usable]
     noisy, light = target.T
