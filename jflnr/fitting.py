@@ -1,30 +1,43 @@
-"""Learning sigma, eps and eps' on frames with a reference, by gradient through the denoiser."""
+"""Learning the numbers of FLR or adaptive FLR on frames with a reference, by gradient through the
+whole denoiser."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import jaxopt
+import numpy as np
 
 from jflnr import checks
 from jflnr import guides as guide_layers
 from jflnr.denoising import BLOCK
+from jflnr.flnr.loss import shown_error
+from jflnr.flr.adaptive import flr_adaptive
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
 from jflnr.flr.apply import apply
 from jflnr.flr.blur import blur
 from jflnr.flr.moments import centre, collect
 from jflnr.flr.parameters import DEFAULT, Parameters
 from jflnr.flr.solve import solve
-from jflnr.frame import Frame
+from jflnr.frame import Array, Frame
+from jflnr.inputs import adaptive_images, frame_inputs
+from jflnr.metrics import exposure
 
-# How far the window reaches while it is fitted, pixels: three times the widest worth having.
+METHODS = ("flr", "flr-adaptive")
+# How far the window of FLR reaches while it is fitted, pixels: three times the widest worth having.
 SUPPORT = 96
+# Of larger frames adaptive FLR is fitted to the middle: its derivative takes 4 KB a pixel.
+HEIGHT, WIDTH = 360, 640
+# Light that is brighter than this, as exposed, is white however bright it is.
+BRIGHTEST = 1e4
 
 
 class Example(NamedTuple):
-    """One frame as fitting sees it: what does not depend on the parameters is done once."""
+    """One frame as fitting FLR sees it: what does not depend on the parameters is done once."""
 
     moments: jax.Array  # (K, h, w), not blurred
     shift: jax.Array  # (Q,)
@@ -33,10 +46,19 @@ class Example(NamedTuple):
     reference: jax.Array  # (H, W, 3), demodulated
 
 
-class Fit(NamedTuple):
-    """Fitted parameters, and the mean SMAPE over the frames before and after."""
+class AdaptiveExample(NamedTuple):
+    """One frame as fitting adaptive FLR sees it. images: arguments of `flr_adaptive`. albedo:
+    `(H, W, 3)`, times the exposure. target: `(H, W, 3)`, the reflected light as exposed."""
 
-    parameters: Parameters
+    images: dict[str, Any]
+    albedo: Array
+    target: Array
+
+
+class Fit(NamedTuple):
+    """Fitted parameters, and the mean loss over the frames before and after."""
+
+    parameters: Parameters | AdaptiveParameters
     before: float
     after: float
     steps: int
@@ -44,50 +66,66 @@ class Fit(NamedTuple):
 
 def fit(
     frames: Sequence[Frame],
+    method: str = "flr",
     *,
     guides: Sequence[str] | None = None,
     block: int = BLOCK,
-    initial: Parameters = DEFAULT,
+    initial: Parameters | AdaptiveParameters | None = None,
     steps: int = 80,
     progress: Callable[[int, float], None] | None = None,
 ) -> Fit:
-    """Minimise the mean SMAPE of the reflected light against the references with L-BFGS.
+    """Minimise the mean error of the reflected light against the references with L-BFGS.
 
-    frames: with a reference each; they may differ in size. guides: as for `denoise`; all frames
-    must have them. progress: called with the step and the mean SMAPE after each step.
+    The error is SMAPE for `flr`; for `flr-adaptive`, which one setting has to serve at all sample
+    counts, the one that FLNR is trained with (`jflnr.flnr.loss.shown_error`).
+
+    frames: with a reference each; they may differ in size. method: one of `METHODS`. guides: as for
+    `denoise`; all frames must have them. block: of `flr`. initial: where to start; the defaults if
+    None. progress: called with the step and the mean error after each step.
 
     Raises `ValueError` if there is no frame, or one without a reference or a guide.
     """
+    checks.choice("method", method, METHODS)
     checks.positive_integer("block", block)
     checks.positive_integer("steps", steps)
     if not frames:
         raise ValueError("frames is empty; fitting needs at least one frame with a reference")
+    if any(frame.reference is None for frame in frames):
+        raise ValueError("frames: every frame needs a reference to be fitted to")
     names = guide_layers.choose(frames[0], guides)
-    examples = [_example(frame, guide_layers.choose(frame, names), block) for frame in frames]
+    examples: list[Any]
+    if method == "flr":
+        examples = [_example(frame, guide_layers.choose(frame, names), block) for frame in frames]
+        one = lambda parameters, example: _value_and_grad(parameters, example, block)
+    else:
+        examples = [_adaptive(frame, guide_layers.choose(frame, names)) for frame in frames]
+        one = _adaptive_value_and_grad
 
-    def mean_smape(parameters: Parameters) -> tuple[jax.Array, Parameters]:
+    values: list[float] = []
+
+    def mean_loss(parameters: Any) -> tuple[jax.Array, Any]:
         # One frame at a time: memory for one, and one program for all frames of a size.
-        losses = [_smape_and_gradient(example, parameters, block) for example in examples]
-        return jax.tree.map(lambda *values: sum(values) / len(values), *losses)
+        losses = [one(parameters, example) for example in examples]
+        mean = jax.tree.map(lambda *some: sum(some) / len(some), *losses)
+        values.append(float(mean[0]))
+        return mean
 
-    solver = jaxopt.LBFGS(
-        mean_smape, value_and_grad=True, jit=False, linesearch="backtracking", maxls=6, tol=1e-4
+    done = itertools.count(1)
+    # SciPy's search along lines never ends above its start, as `jaxopt.LBFGS` did here.
+    solver = jaxopt.ScipyMinimize(
+        fun=mean_loss,
+        value_and_grad=True,
+        jit=False,
+        method="L-BFGS-B",
+        maxiter=steps,
+        callback=lambda _: progress(next(done), min(values)) if progress else None,
     )
-    parameters = jax.tree.map(jnp.asarray, initial)
-    state = solver.init_state(parameters)
-    before = float(state.value)
-    step = 0
-    while step < steps and state.error > solver.tol:
-        parameters, state = solver.update(parameters, state)
-        step += 1
-        if progress is not None:
-            progress(step, float(state.value))
-    return Fit(parameters, before, float(state.value), step)
+    start = (DEFAULT if method == "flr" else ADAPTIVE_DEFAULT) if initial is None else initial
+    parameters, info = solver.run(jax.tree.map(jnp.float32, start))
+    return Fit(parameters, values[0], float(info.fun_val), int(info.iter_num))
 
 
 def _example(frame: Frame, names: tuple[str, ...], block: int) -> Example:
-    if frame.reference is None:
-        raise ValueError("frames: every frame needs a reference to be fitted to")
     layers = guide_layers.layers(frame, names)
     weight = None if frame.mask is None else jnp.asarray(frame.mask)[..., 0] > 0
     shift = centre(layers, weight)
@@ -119,7 +157,21 @@ def _loss(parameters: Parameters, example: Example, block: int) -> jax.Array:
 _value_and_grad = jax.jit(jax.value_and_grad(_loss), static_argnames="block")
 
 
-def _smape_and_gradient(
-    example: Example, parameters: Parameters, block: int
-) -> tuple[jax.Array, Parameters]:
-    return _value_and_grad(parameters, example, block)
+def _adaptive(frame: Frame, names: tuple[str, ...]) -> AdaptiveExample:
+    albedo, reference = np.asarray(frame.albedo), np.asarray(frame.reference)
+    scale = np.float32(exposure(albedo * reference))
+    top, left = max(len(albedo) - HEIGHT, 0) // 2, max(albedo.shape[1] - WIDTH, 0) // 2
+    cut = lambda layer: np.asarray(layer)[top : top + HEIGHT, left : left + WIDTH]
+    shown = scale * cut(albedo)
+    middle = jax.tree.map(cut, frame_inputs(frame, names))
+    images = jax.tree.map(np.asarray, adaptive_images(middle, names))
+    return AdaptiveExample(images, shown, np.clip(shown * cut(reference), 0, BRIGHTEST))
+
+
+def _adaptive_loss(parameters: AdaptiveParameters, example: AdaptiveExample) -> jax.Array:
+    images = example.images
+    light = flr_adaptive(images["target"], images["guides"], parameters, weight=images["weight"])
+    return shown_error(light * example.albedo, jnp.asarray(example.target))
+
+
+_adaptive_value_and_grad = jax.jit(jax.value_and_grad(_adaptive_loss))

@@ -20,7 +20,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
         return _settings_of_another(arguments)
     model, about = parameters.DEFAULT, dict[str, Any]()
     if arguments.params:
-        model, about = parameters.load_parameters(arguments.params)
+        model, about = _load(arguments)
     values = {}
     for name in ("sigma", "eps", "eps_prime"):
         given = getattr(arguments, name)
@@ -35,25 +35,42 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
-    """As `_settings`, for methods that have no sigma, eps and eps' to set."""
+    """As `settings_of`, for methods that have no sigma, eps and eps' to set."""
     from jflnr.denoising import BLOCK
     from jflnr.flnr import METHODS, weights
 
-    network = arguments.method in METHODS
-    for name in ("sigma", "eps", "eps_prime", *(() if network else ("params",))):
+    learned = arguments.method in ("flr-adaptive", *METHODS)
+    for name in ("sigma", "eps", "eps_prime", *(() if learned else ("params",))):
         if getattr(arguments, name) is not None:
             option = name.replace("_", "-")
             raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
     if arguments.method == "bmfr" and arguments.guides is not None:
         raise ValueError("--guides is not for --method bmfr, whose features are the paper's")
-    own = None if arguments.params is None else weights.load(arguments.params)[0]
+    own, about = None, dict[str, Any]()
+    if arguments.params is not None and arguments.method in METHODS:
+        own = weights.load(arguments.params)[0]
+    elif arguments.params is not None:
+        own, about = _load(arguments)
     return {
         "method": arguments.method,
         "backend": arguments.backend,
         "parameters": own,
-        "guides": arguments.guides,
+        "guides": _guides(about) if arguments.guides is None else arguments.guides,
         "block": BLOCK if arguments.block is None else arguments.block,
     }
+
+
+def _load(arguments: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
+    """The parameters that `--params` names, which must be the method's."""
+    from jflnr.flr.parameters import load_parameters, method_of
+
+    model, about = load_parameters(arguments.params)
+    if (fitted := method_of(model)) != arguments.method:
+        raise ValueError(
+            f"{arguments.params} holds parameters of method {fitted}, and --method is "
+            f"{arguments.method}; `jflnr fit --method {arguments.method}` makes what is needed"
+        )
+    return model, about
 
 
 def _guides(about: dict[str, Any]) -> list[str] | None:

@@ -22,12 +22,17 @@ def light(params: unet.Params, example: Example) -> jax.Array:
 
 
 def to_reference(params: unet.Params, example: Example) -> jax.Array:
+    """For a target without noise: `shown_error`."""
+    picture = light(params, example) * example.albedo * example.exposure
+    return shown_error(picture, example.target)
+
+
+def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:
     """Mean squared error of the displayed picture in decibels, plus SMAPE times `SMAPE`.
 
     Decibels, since PSNR is what pictures are judged by: every frame counts alike.
+    picture, target: `(H, W, 3)`, reflected light as exposed.
     """
-    target = example.target
-    picture = light(params, example) * example.albedo * example.exposure
     error = jnp.mean((_shown(picture) - _shown(jnp.minimum(target, 1))) ** 2)
     smape = jnp.mean(jnp.abs(picture - target) / (jnp.abs(picture) + target + 0.01))
     return 10 * jnp.log10(error + FLOOR) + SMAPE * smape

@@ -48,8 +48,13 @@ class AdaptiveParameters(NamedTuple):
         """The numbers themselves instead of their logarithms."""
         return jax.tree.map(jnp.exp, self)
 
+    @classmethod
+    def of(cls, **numbers: float) -> AdaptiveParameters:
+        """From all the numbers; `ValueError` unless they are positive."""
+        return cls(*([0.0] * len(cls._fields))).but(**numbers)
 
-ADAPTIVE_DEFAULT = AdaptiveParameters(*([0.0] * 12)).but(
+
+ADAPTIVE_DEFAULT = AdaptiveParameters.of(
     sigma=2.0,
     eps=1e-4,
     eps_prime=1e-4,

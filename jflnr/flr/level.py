@@ -114,8 +114,9 @@ def windowed(
         else gather(grid.moments, window)
     )
     n = jnp.maximum(moments[0], 1e-12)
-    # Not divided by the square, whose own square, in the derivative, is too small for float32.
-    variance = gather(grid.noise, window.squared())[0] * (1 / (n * grid.block)) ** 2
+    # The square of n and, in derivatives, the square of that would be too small for float32.
+    inverse = 1 / (n * grid.block)
+    variance = gather(grid.noise, window.squared())[0] * inverse * inverse
     start = index_xy(0, 0, guides + positions, channels)
     colour = moments[start : start + channels] / n
     level = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))

@@ -1,4 +1,5 @@
-"""The three learned numbers of Fast Local Regression, and the small file they are kept in."""
+"""The learned numbers of Fast Local Regression, and the small file that those of a method are kept
+in."""
 
 from __future__ import annotations
 
@@ -9,6 +10,8 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
 
 FORMAT = "jflnr-parameters"
 VERSION = 1
@@ -54,22 +57,38 @@ class Parameters(NamedTuple):
 DEFAULT = Parameters.of(sigma=15.0, eps=1.3e-5, eps_prime=6.5e-3)
 
 
-def save_parameters(path: str | Path, parameters: Parameters, **about: Any) -> None:
+# What a file is of, and the numbers that it must hold.
+NUMBERS = {"flr": ("sigma", "eps", "eps_prime"), "flr-adaptive": AdaptiveParameters._fields}
+
+
+def save_parameters(
+    path: str | Path, parameters: Parameters | AdaptiveParameters, **about: Any
+) -> None:
     """Write the parameters as JSON, with anything else worth knowing about the fit."""
     from jflnr.files import write_atomically
 
     text = {
         "format": FORMAT,
         "version": VERSION,
-        "sigma": float(parameters.sigma),
-        "eps": float(parameters.eps),
-        "eps_prime": float(parameters.eps_prime),
+        "method": method_of(parameters),
+        **numbers_of(parameters),
         **about,
     }
     write_atomically(path, (json.dumps(text, indent=2) + "\n").encode())
 
 
-def load_parameters(path: str | Path) -> tuple[Parameters, dict[str, Any]]:
+def method_of(parameters: Parameters | AdaptiveParameters) -> str:
+    """The method whose parameters these are."""
+    return "flr" if isinstance(parameters, Parameters) else "flr-adaptive"
+
+
+def numbers_of(parameters: Parameters | AdaptiveParameters) -> dict[str, float]:
+    """The numbers by name, not their logarithms."""
+    known = parameters if isinstance(parameters, Parameters) else parameters.numbers()
+    return {name: float(getattr(known, name)) for name in NUMBERS[method_of(parameters)]}
+
+
+def load_parameters(path: str | Path) -> tuple[Parameters | AdaptiveParameters, dict[str, Any]]:
     """Parameters and the rest of the file; `ValueError` if it is not such a file."""
     wanted = f"a JSON file that `jflnr fit` wrote (format {FORMAT!r}, version {VERSION})"
     try:
@@ -80,10 +99,15 @@ def load_parameters(path: str | Path) -> tuple[Parameters, dict[str, Any]]:
         raise ValueError(f"{path}: cannot be read ({error}); it should be {wanted}") from None
     if not isinstance(text, dict) or text.get("format") != FORMAT or text.get("version") != VERSION:
         raise ValueError(f"{path}: not a parameter file; it should be {wanted}")
+    method = text.get("method", "flr")
+    if method not in NUMBERS:
+        raise ValueError(f"{path}: its method is {method!r}; it should be {' or '.join(NUMBERS)}")
     try:
-        values = {name: float(text[name]) for name in ("sigma", "eps", "eps_prime")}
+        values = {name: float(text[name]) for name in NUMBERS[method]}
     except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(
-            f"{path}: sigma, eps and eps_prime must all be there as numbers; it should be {wanted}"
+            f"{path}: {', '.join(NUMBERS[method])} must all be there as numbers; "
+            f"it should be {wanted}"
         ) from None
-    return Parameters.of(**values), text
+    kind = Parameters if method == "flr" else AdaptiveParameters
+    return kind.of(**values), text

@@ -66,8 +66,9 @@ def step(
 
     light, image, expected, known = reproject(context, state, surface, motion, covered)
     change, evidence = find_change(
-        context, sample, light.mean, expected, known, layers, state.evidence, temporal.caution
-    )
+        context, sample, light.mean, expected, known, covered, layers, state.evidence,
+        temporal.caution,
+    )  # fmt: skip
     least = temporal.light, temporal.image
     light, weight = accumulate(context, light, change, sample, covered, least[0])
     fitted = _fit(context, light.mean, layers, weight, parameters, method)

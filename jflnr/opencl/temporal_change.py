@@ -19,7 +19,7 @@ from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP, Grid, Run, brightness_defines
 from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.moments import centre, collect
-from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY
+from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY, UNCOVERED
 
 NUMBERS = jax.tree.map(lambda number: math.exp(float(number)), ADAPTIVE_DEFAULT)
 # Planes that are averaged over the windows, see change.cl.
@@ -46,14 +46,16 @@ def find_change(
     light: Any,
     expected: Any,
     known: Any,
+    covered: Any,
     guides: tuple[Any, ...],
     evidence: Any,
     caution: float,
 ) -> tuple[Change, Any]:
     """`jflnr.temporal.change.find_change`, of device arrays.
 
-    sample, light: `(H, W, 3)`, the new frame and the history. expected, known: `(H, W)`, brightness
-    of the history, and 1 where there is one.
+    sample, light: `(H, W, 3)`, the new frame and the history. expected: `(H, W)`, brightness of the
+    history. covered: `(H, W, 1)`, above 0 where there is something to denoise. known: `(H, W)`, 1
+    where that has a history.
     """
     target, weight, unit = _difference(context, sample, light, expected, known)
     shift, mean = centre(context, guides), context.array(np.ones(2, np.float32))
@@ -63,6 +65,7 @@ def find_change(
     grid, level = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
     fit = fit_level(run, grid, BLOCK)
     model, wrong, evidence = _judge(run, fit, level, evidence, caution)
+    _add_uncovered(run, known, covered, wrong)
     signal, noise = context.empty(sample.shape), context.empty((*sample.shape[:2], 1))
     apply(context, model, guides, shift, BLOCK, grid.sizes, signal)
     apply(context, wrong, (), shift, BLOCK, grid.sizes, noise)
@@ -122,6 +125,16 @@ def _judge(
         evidence, after.planes, model, wrong,
     )  # fmt: skip
     return model, wrong, after.planes
+
+
+def _add_uncovered(run: Run, known: Any, covered: Any, wrong: Any) -> None:
+    """Adds what the history takes on around places that come into view to `wrong`."""
+    height, width = known.shape
+    h, pitch = wrong.shape[2:]
+    w = -(-width // BLOCK)
+    arguments = height, width, pitch, BLOCK, UNCOVERED, known, covered, wrong
+    defines = _defines(run) | {"WIDTH": 1}
+    run.context.run("add_uncovered", "temporal/change.cl", defines, (w, h), arguments)
 
 
 def _defines(run: Run) -> dict[str, Any]:

@@ -32,6 +32,8 @@ FOLLOWED = 0.7
 DIM = 0.3
 # Frames of noise that the history takes on where the light is all new: how wrong its details are.
 NOVELTY = 10.0
+# Around what comes into view it takes on one, in full where this part of a block has come.
+UNCOVERED = 0.25
 
 
 class Evidence(NamedTuple):
@@ -62,23 +64,25 @@ def find_change(
     difference: jax.Array,
     expected: jax.Array,
     guides: Guides,
-    weight: jax.Array,
+    known: jax.Array,
+    new: jax.Array,
     evidence: Evidence,
     caution: jax.Array | float,
 ) -> tuple[Change, Evidence]:
     """What of the difference between a new frame and the history is signal.
 
     difference: `(H, W, C)`. expected: `(H, W)`, brightness of the history, for the weights of
-    `adaptive.py`. guides: `(H, W, Q)` or several. weight: `(H, W)`, 0 where there is no history.
+    `adaptive.py`. guides: `(H, W, Q)` or several. known, new: `(H, W)`, 1 where there is something
+    to denoise, with a history and without, else 0.
     Returns the change, and the evidence for the next frame.
     """
-    numbers, shift, unit = ADAPTIVE_DEFAULT.numbers(), centre(guides), _mean(expected, weight)
+    numbers, shift, unit = ADAPTIVE_DEFAULT.numbers(), centre(guides), _mean(expected, known)
     difference, expected = difference / unit, jnp.maximum(expected / unit, 0)
     light = light_of(difference)
     usable = jnp.isfinite(light)
     for layer in jax.tree.leaves(guides):
         usable &= jnp.all(jnp.isfinite(layer), axis=-1)
-    weight = jnp.where(usable, weight / (expected + numbers.offset), 0)
+    weight = jnp.where(usable, known / (expected + numbers.offset), 0)
     squares = jnp.where(weight > 0, weight * light, 0) ** 2
     grid = Grid(*collect_weighted(difference, guides, shift, weight, squares, BLOCK), BLOCK)
     count, total = collect(expected[..., None], (), shift[:0], BLOCK, weight)
@@ -86,9 +90,20 @@ def find_change(
     found = predict(fit.coefficients, mean_guides(grid.moments, shift.size))
     level = total / jnp.maximum(count, 1e-12)
     share, noise, evidence = _judge(fit, found, level, grid.moments[0] > 1e-12, evidence, caution)
+    noise += _uncovered(known, new)
     signal = apply(share * fit.coefficients, guides, shift, BLOCK)
     noise = apply(noise[None, None], jnp.zeros((*light.shape, 0)), shift[:0], BLOCK)
     return Change(signal * unit, noise), evidence
+
+
+def _uncovered(known: jax.Array, new: jax.Array) -> jax.Array:
+    """What the history takes on around places that come into view, `(h, w)`.
+
+    Something moved there, and with it its shadow, which is too small to be told from noise.
+    """
+    no_guides = jnp.zeros(0)
+    _, old, came = collect(jnp.stack([known, new], axis=-1), (), no_guides, BLOCK)
+    return jnp.minimum(came / jnp.maximum(UNCOVERED * (old + came), 1e-12), 1)
 
 
 def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:

@@ -140,12 +140,13 @@ def _step(
     guides, mask = images["guides"], images["weight"]
     taps = find_taps(motion, surface, state.surface)
     light, image = reproject(state.light, taps), reproject(state.image, taps)
-    known = light.samples[..., 0] > 0
+    known, covered = light.samples[..., 0] > 0, True if mask is None else mask
     change, evidence = find_change(
         jnp.asarray(frame.indirect) - light.mean,
         light_of(image.mean),
         guides,
-        jnp.where(known if mask is None else known & mask, 1.0, 0.0),
+        jnp.where(known & covered, 1.0, 0.0),
+        jnp.where(~known & covered, 1.0, 0.0),
         state.evidence,
         temporal.caution,
     )

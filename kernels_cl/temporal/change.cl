@@ -106,3 +106,23 @@ kernel void judge(
     for (int k = 0; k < (Q + 1) * C; ++k)
         WRITE(share * READ(models + k * GROUP), model + k * plane + block);
 }
+
+// A block at a time: where something that has no history comes into view, what the history around it
+// takes on. known: (H, W), 1 where there is a history. covered: (H, W), above 0 where there is
+// something to denoise. wrong: (h, pitch). Global size (w, h).
+kernel void add_uncovered(
+    int height, int width, int pitch, int block, float uncovered, global const float *known,
+    global const float *covered, global float *wrong)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    const int right = MIN((x + 1) * block, width), bottom = MIN((y + 1) * block, height);
+    if (x * block >= width || y * block >= height) return;
+    float all = 0, old = 0;
+    for (int row = y * block; row < bottom; ++row)
+        for (int column = x * block; column < right; ++column) {
+            const long pixel = (long)row * width + column;
+            all += covered[pixel] > 0 ? 1 : 0;
+            old += known[pixel];
+        }
+    wrong[(long)y * pitch + x] += MIN((all - old) / MAX(uncovered * all, 1e-12f), 1);
+}

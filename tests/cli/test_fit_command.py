@@ -5,12 +5,15 @@ import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from jflnr import fitting
+import jflnr
+from jflnr import exr, fitting
 from jflnr.cli import main
+from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
 from jflnr.flr.parameters import Parameters, load_parameters
-from jflnr.frame import Frame, write_frame
+from jflnr.frame import Frame, read_frame, write_frame
 
 
 @pytest.fixture
@@ -18,11 +21,18 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
     calls: list[dict] = []
 
     def fit(
-        frames: Sequence[Frame], *, progress: Callable[[int, float], None], **settings: object
+        frames: Sequence[Frame],
+        method: str,
+        *,
+        progress: Callable[[int, float], None],
+        **settings: object,
     ) -> fitting.Fit:
-        calls.append({"frames": len(frames), **settings})
+        calls.append({"frames": len(frames), "method": method, **settings})
         progress(1, 0.25)
-        return fitting.Fit(Parameters.of(20, 1e-3, 1e-4), 0.5, 0.25, 1)
+        numbers = Parameters.of(20, 1e-3, 1e-4)
+        if method == "flr-adaptive":
+            return fitting.Fit(ADAPTIVE_DEFAULT.but(sigma=1.5), -20, -21, 1)
+        return fitting.Fit(numbers, 0.5, 0.25, 1)
 
     monkeypatch.setattr(fitting, "fit", fit)
     return calls
@@ -39,10 +49,34 @@ def test_result_is_printed_and_read_by_denoise(
     assert main([*argv, "--guides", "normal", "--block", "4"]) == 0
     text = capsys.readouterr().out
     assert "step 1: SMAPE 0.25" in text and "SMAPE 0.50000 before, 0.25000 after, steps: 1" in text
-    assert stand_in == [{"frames": 2, "guides": ("normal",), "block": 4, "steps": 3}]
+    assert stand_in == [
+        {"frames": 2, "method": "flr", "guides": ("normal",), "block": 4, "steps": 3}
+    ]
     parameters, about = load_parameters(out)
     assert float(parameters.sigma) == pytest.approx(20)
-    assert (about["guides"], about["block"], about["spp"]) == (["normal"], 4, 1)
+    assert (about["guides"], about["block"], about["spp"]) == (["normal"], 4, [1])
+
+
+def test_parameters_are_for_the_method_they_were_fitted_for(
+    tmp_path: Path,
+    frame_file: Path,
+    stand_in: list[dict],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    params, out = tmp_path / "p.json", tmp_path / "out"
+    argv = ["fit", str(frame_file), "-o", str(params), "--method", "flr-adaptive"]
+    assert main(argv) == 0
+    assert "sigma 1.5, eps 0.0001" in capsys.readouterr().out
+    found, about = load_parameters(params)
+    assert isinstance(found, AdaptiveParameters) and "block" not in about
+    np.testing.assert_allclose(found, ADAPTIVE_DEFAULT.but(sigma=1.5), rtol=1e-6)
+    denoise = ["denoise", str(frame_file), "-o", str(out), "--params", str(params)]
+    assert main([*denoise, "--method", "flr-adaptive", "--quiet"]) == 0
+    light = exr.read_channels(out / frame_file.name)["indirect.G"]
+    wanted = jflnr.denoise(read_frame(frame_file), "flr-adaptive", parameters=found)
+    np.testing.assert_allclose(light, wanted[..., 1], rtol=2e-3, atol=1e-4)
+    assert main(denoise) == 2
+    assert "holds parameters of method flr-adaptive" in capsys.readouterr().err
 
 
 def test_output_is_kept_unless_overwritten(

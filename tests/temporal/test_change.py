@@ -12,6 +12,7 @@ Y, X = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32) / WIDTH
 GUIDES = np.stack([np.where(X < 0.5, 1, 0), np.where(X < 0.5, 0, 1), 1 + Y], -1).astype(np.float32)
 BEFORE = (0.5 + Y + (X < 0.5)).astype(np.float32)
 CAUTION = 3.5
+NONE = np.zeros_like(BEFORE)
 
 find_jit = jax.jit(find_change)
 
@@ -33,7 +34,7 @@ def follow(
     for seed in range(frames):
         difference = sparse_noise(after, seed) - history
         change, evidence = find_jit(
-            scale * difference, scale * history[..., 1], GUIDES, weight, evidence, CAUTION
+            scale * difference, scale * history[..., 1], GUIDES, weight, NONE, evidence, CAUTION
         )
         signal = np.asarray(change.signal) / scale
         found.append(np.mean(np.abs(signal)) / np.mean(history))
@@ -80,10 +81,20 @@ def test_a_pixel_that_is_not_finite_does_not_count() -> None:
     weight = np.ones_like(BEFORE)
     weight[5, 7] = 0
     evidence = no_evidence(HEIGHT, WIDTH)
-    with_nan = find_jit(spoilt, BEFORE, GUIDES, np.ones_like(BEFORE), evidence, CAUTION)
-    without = find_jit(difference, BEFORE, GUIDES, weight, evidence, CAUTION)
+    with_nan = find_jit(spoilt, BEFORE, GUIDES, np.ones_like(BEFORE), NONE, evidence, CAUTION)
+    without = find_jit(difference, BEFORE, GUIDES, weight, NONE, evidence, CAUTION)
     for found, wanted in zip(jax.tree.leaves(with_nan), jax.tree.leaves(without), strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-5)
+
+
+def test_around_what_comes_into_view_the_history_counts_little() -> None:
+    new = np.where((Y < 24 / WIDTH) & (X < 24 / WIDTH), 1, NONE)
+    inputs = sparse_noise(BEFORE, 0) - BEFORE[..., None], BEFORE, GUIDES
+    evidence = no_evidence(HEIGHT, WIDTH)
+    with_new = find_jit(*inputs, 1 - new, new, evidence, CAUTION)[0].noise
+    np.testing.assert_allclose(with_new[:16, :16], 1, rtol=1e-4)
+    assert with_new.max() < 1.001
+    np.testing.assert_allclose(with_new[:, 2 * BLOCK :], 0, atol=1e-4)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (BLOCK + 1, 2 * BLOCK)])
