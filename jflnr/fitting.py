@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import jaxopt
 import numpy as np
+from jaxopt.tree_util import tree_l2_norm
 
 from jflnr import checks
 from jflnr import guides as guide_layers
@@ -32,6 +33,9 @@ METHODS = ("flr", "flr-adaptive")
 SUPPORT = 96
 # Of larger frames adaptive FLR is fitted to the middle: its derivative takes 4 KB a pixel.
 HEIGHT, WIDTH = 360, 640
+# Where a threshold is nearly crossed one frame's derivative may be thousands of times that of
+# others, and does not tell what a whole step changes. So none is longer; most are near 1.
+LONGEST = 5.0
 # Light that is brighter than this, as exposed, is white however bright it is.
 BRIGHTEST = 1e4
 
@@ -174,4 +178,10 @@ def _adaptive_loss(parameters: AdaptiveParameters, example: AdaptiveExample) -> 
     return shown_error(light * example.albedo, jnp.asarray(example.target))
 
 
-_adaptive_value_and_grad = jax.jit(jax.value_and_grad(_adaptive_loss))
+@jax.jit
+def _adaptive_value_and_grad(
+    parameters: AdaptiveParameters, example: AdaptiveExample
+) -> tuple[jax.Array, AdaptiveParameters]:
+    value, slope = jax.value_and_grad(_adaptive_loss)(parameters, example)
+    factor = jnp.minimum(1, LONGEST / jnp.maximum(tree_l2_norm(slope), 1e-12))
+    return value, jax.tree.map(lambda component: factor * component, slope)
