@@ -204,7 +204,7 @@ def chart(
 ) -> None:
     """What `values` finds in a row, over frames; a panel for each sequence."""
     names = list(dict.fromkeys(row["shot"] for row in rows))
-    columns = min(len(names), 4)
+    columns = min(len(names), 3)
     with plots.figure(path, columns, (4, 2.8), -(-len(names) // columns)) as axes:
         panels = np.atleast_1d(axes)
         for axis, name in zip(panels, names, strict=False):
@@ -212,7 +212,7 @@ def chart(
                 if row["shot"] == name and (style := CHARTED.get(row["method"])):
                     found = np.array(values(row), float)
                     axis.plot(found, style[0], color=style[1], label=row["method"])
-            axis.set(title=name.replace("_", ", "), yscale=scale)
+            axis.set(title=name.replace("_", ", "), xlabel="frame", yscale=scale)
             axis.xaxis.set_major_locator(MaxNLocator(integer=True))
             # Those between powers of ten would overlap.
             axis.yaxis.set_minor_formatter(NullFormatter())
