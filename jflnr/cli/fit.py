@@ -51,7 +51,6 @@ def run(arguments: argparse.Namespace) -> int:
     from jflnr.guides import choose
 
     checks.choice("--method", arguments.method, METHODS)
-
     if arguments.output.exists() and not arguments.overwrite:
         print(f"{arguments.output} kept as it is; --overwrite replaces it")
         return 0

@@ -100,7 +100,7 @@ def load_parameters(path: str | Path) -> tuple[Parameters | AdaptiveParameters, 
     if not isinstance(text, dict) or text.get("format") != FORMAT or text.get("version") != VERSION:
         raise ValueError(f"{path}: not a parameter file; it should be {wanted}")
     method = text.get("method", "flr")
-    if method not in NUMBERS:
+    if method not in list(NUMBERS):
         raise ValueError(f"{path}: its method is {method!r}; it should be {' or '.join(NUMBERS)}")
     try:
         values = {name: float(text[name]) for name in NUMBERS[method]}

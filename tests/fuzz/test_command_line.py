@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from jflnr.cli import main
+from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.parameters import load_parameters
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
@@ -95,9 +96,10 @@ FILES = st.one_of(
             "eps_prime": NUMBERS,
         },
     ).map(lambda d: json.dumps(d).encode()),
-    st.fixed_dictionaries({"sigma": NUMBERS, "eps": NUMBERS, "eps_prime": NUMBERS}).map(
-        lambda d: json.dumps({"format": "jflnr-parameters", "version": 1, **d}).encode()
-    ),
+    st.fixed_dictionaries(
+        dict.fromkeys(AdaptiveParameters._fields, NUMBERS),
+        optional={"method": st.sampled_from(["flr", "flr-adaptive", "auto", None, 1, [], {}])},
+    ).map(lambda d: json.dumps({"format": "jflnr-parameters", "version": 1, **d}).encode()),
 )
 
 
