@@ -81,7 +81,7 @@ kernel void share_columns(
             sums[k] += weights[t] * READ(rows + k * GROUP + (long)to_row[t] * pitch * 3);
     }
     const real total = MAX(sums[0], 1e-9f * sums[2]), signal = sums[0] - caution * sums[1];
-    WRITE(total > 0 ? MAX(signal, 0) / total : (real)0, share + AT(x, y, pitch, 1));
+    WRITE(sums[2] > 1e-12f ? MAX(signal, 0) / total : (real)0, share + AT(x, y, pitch, 1));
 }
 
 // fine, coarse, coarse_merged, merged: models. share: of the coarser grid.

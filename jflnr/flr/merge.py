@@ -36,8 +36,10 @@ def signal_share(
     there = (grid.moments[0] > 1e-12).astype(reference.dtype)
     planes = jnp.stack([difference**2 / reference, noise / reference, jnp.ones_like(noise)])
     power, noise, count = gather(halve(planes * there), window)
-    total = jnp.maximum(power, 1e-9 * count)
-    share = jnp.maximum(power - caution * noise, 0) / jnp.where(total > 0, total, 1)
+    # Means, not sums, whose squares, in the derivative, are too small for float32 far from all light.
+    inverse = jnp.where(count > 1e-12, 1 / jnp.where(count > 1e-12, count, 1), 0)
+    power, noise = power * inverse, noise * inverse
+    share = jnp.maximum(power - caution * noise, 0) / jnp.maximum(power, 1e-9)
     return double(share, height, width)
 
 

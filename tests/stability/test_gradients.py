@@ -71,12 +71,19 @@ def test_flnr(case):
     is_finite(flnr, case, shipped("flnr-tiny"), np.array([0, 0, 0]))
 
 
-@pytest.mark.parametrize("method", [wide_flr, flr_adaptive])
-def test_far_from_all_light(method):
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [
+        (wide_flr, DEFAULT),
+        (flr_adaptive, ADAPTIVE_DEFAULT),
+        (flr_adaptive, ADAPTIVE_DEFAULT.but(sigma=0.85)),
+        (flr_adaptive, ADAPTIVE_DEFAULT.but(sigma=0.4)),
+    ],
+)
+def test_far_from_all_light(method, parameters):
     """Windows that reach no usable pixel at all, as in a wide sky."""
     made = make("ordinary", 16, 240, np.float32)
     usable = np.arange(240) < 40
-    parameters = DEFAULT if method is wide_flr else ADAPTIVE_DEFAULT
     arrays = made.target[..., :1], made.guides, jax.tree.map(np.float32, parameters)
     weight = jnp.asarray(np.broadcast_to(usable, (16, 240)))
     found = gradient(method)(*jax.tree.map(jnp.asarray, arrays), weight, 1)
