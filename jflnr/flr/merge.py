@@ -36,7 +36,7 @@ def signal_share(
     there = (grid.moments[0] > 1e-12).astype(reference.dtype)
     planes = jnp.stack([difference**2 / reference, noise / reference, jnp.ones_like(noise)])
     power, noise, count = gather(halve(planes * there), window)
-    # Means, not sums, whose squares, in the derivative, are too small for float32 far from all light.
+    # Means: far from all light the squares of sums, in the derivative, are too small for float32.
     inverse = jnp.where(count > 1e-12, 1 / jnp.where(count > 1e-12, count, 1), 0)
     power, noise = power * inverse, noise * inverse
     share = jnp.maximum(power - caution * noise, 0) / jnp.maximum(power, 1e-9)
