@@ -104,7 +104,7 @@ def test_any_shape(problem):
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
 @given(PROBLEMS)
 def test_many_shapes(problem):
     derivatives_agree(problem)
