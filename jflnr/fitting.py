@@ -31,7 +31,7 @@ from jflnr.metrics import exposure
 METHODS = ("flr", "flr-adaptive")
 # How far the window of FLR reaches while it is fitted, pixels: three times the widest worth having.
 SUPPORT = 96
-# Of larger frames adaptive FLR is fitted to the middle: its derivative takes 4 KB a pixel.
+# Of larger frames adaptive FLR is fitted to the middle: its derivative keeps all steps in memory.
 HEIGHT, WIDTH = 360, 640
 # Where a threshold is nearly crossed one frame's derivative may be thousands of times that of
 # others, and does not tell what a whole step changes. So none is longer; most are near 1.
