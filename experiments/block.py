@@ -18,7 +18,7 @@ from jflnr.frame import Array, Frame
 
 NAME = "block"
 QUESTION = "Is there 'no discernible loss' at blocks of 8 x 8, and may the inputs shrink instead?"
-MINUTES = 3
+MINUTES = 2
 
 WAYS = {
     "moments": "moments made smaller (FLR)",

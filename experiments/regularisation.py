@@ -23,7 +23,7 @@ from jflnr.flr.solve import cholesky_solve, solve
 
 NAME = "regularisation"
 QUESTION = "How do accuracy and stability depend on eps and eps', and is Tikhonov as good?"
-MINUTES = 10
+MINUTES = 1
 
 SUPPORT = 72
 

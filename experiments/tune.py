@@ -18,7 +18,7 @@ from jflnr.metrics import display, exposure, psnr
 
 NAME = "tune"
 QUESTION = "Which parameters of the peers are best on the validation frames?"
-MINUTES = 20
+MINUTES = 1
 
 GUIDES = (("normal", "depth"), ("normal", "depth", "ao"))
 # Where the search starts, and the values that each parameter takes in turn.
@@ -41,7 +41,7 @@ SEARCH: dict[str, tuple[Denoiser, Mapping[str, Any], dict[str, tuple[Any, ...]]]
     "SVGF, spatial": (
         svgf.denoise,
         svgf.TUNED,
-        {"sigma_l": (16, 64, 1e3), "sigma_n": (4, 8, 32), "sigma_z": (1.0, 4.0, 16.0)},
+        {"sigma_l": (16, 64, 1e3), "sigma_n": (2.0, 4.0, 8.0, 32.0), "sigma_z": (4.0, 16.0, 64.0)},
     ),
     "BMFR, one frame": (
         bmfr.denoise,

@@ -20,7 +20,7 @@ from jflnr.guides import shrink
 
 NAME = "upsample"
 QUESTION = "For the same rays, is light traced at 1/2 or 1/4 resolution as good?"
-MINUTES = 3
+MINUTES = 1
 
 FACTORS = (1, 2, 4)
 

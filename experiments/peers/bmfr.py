@@ -22,7 +22,12 @@ PAPER: dict[str, Any] = {
     "noise": 0.01,
     "grids": 1,
 }
-TUNED: dict[str, Any] = {"features": ("normal", "position"), "block": 64, "noise": 0.1, "grids": 4}
+TUNED: dict[str, Any] = {
+    "features": ("normal", "position", "position2"),
+    "block": 64,
+    "noise": 0.1,
+    "grids": 4,
+}
 
 
 @functools.partial(jax.jit, static_argnames=("features", "block", "grids"))

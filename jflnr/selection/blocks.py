@@ -236,7 +236,8 @@ def _shift_grid(
     left = light - jnp.einsum("qchw,qhw->chw", coarse.coefficients, sums)
     under = gather(jnp.concatenate([sums[:1], left]), window)
     n = jnp.maximum(under[0], 1e-12)
-    variance = gather(grid.noise, window.squared())[0] / (n * grid.block) ** 2
+    inverse = 1 / (n * grid.block)
+    variance = gather(grid.noise, window.squared())[0] * inverse * inverse
     return Fit(coarse.coefficients.at[0].add(under[1:] / n), variance, window)
 
 
