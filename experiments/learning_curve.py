@@ -1,4 +1,4 @@
-"""The network against the number of scenes and views it learns from: whether more rendering pays."""
+"""The network against the scenes and views that it learns from: whether more rendering pays."""
 
 from __future__ import annotations
 

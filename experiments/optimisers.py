@@ -17,11 +17,11 @@ from jflnr.flnr.train import CONFIGS, Settings, rate_of
 
 NAME = "optimisers"
 QUESTION = "Which optimiser of jaxopt trains the network best in equal time?"
-MINUTES = 60
+MINUTES = 20
 
-SECONDS = 25.0
+SECONDS = 120.0
 # Of frames and validation crops.
-FRAMES, VALIDATION = 16, 8
+FRAMES, VALIDATION = 48, 8
 # What the loss cannot fall below, as the Polyak step needs it.
 LEAST = float(10 * np.log10(loss.FLOOR))
 
