@@ -20,7 +20,7 @@ from jflnr.inputs import flr_images
 
 NAME = "criterion"
 QUESTION = "Which criterion tells best, without a reference, how wrong a local model is?"
-MINUTES = 10
+MINUTES = 1
 
 NAMES = ("normal", "depth", "ao")
 SIGMAS = (8, 16, 32)
@@ -193,7 +193,9 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     mean = {"frame": "mean of test"} | means(table)
     errors = {"frame": "frame", "oracle": "oracle"}
     errors |= {f"{name} error": name for name in CRITERIA}
-    ranks = {"frame": "frame"} | {f"{n} {side}": f"{n}, {side}" for n in names for side in (8, 32)}
+    ranks = {"frame": "frame"} | {
+        f"{n} {side}": f"{n}, {side}" for n in names for side in SIDES[:3]
+    }
     text = results.table([*table, mean], errors) + "\n" + results.table([*table, mean], ranks)
     highest: dict[str, float] = {}
     if result["ceilings"]:
@@ -210,11 +212,11 @@ def draw(result: dict[str, Any], folder: Path) -> None:
             best = [highest[f"ceiling {side}"] for side in SIDES]
             left.plot(SIDES, best, "k:", label="ceiling, training frames")
         left.axhline(0.8, color="grey", linewidth=1)
-        left.set(
-            xlabel="side of the squares, pixels", ylabel="rank correlation with the true error"
-        )
         left.set_xscale("log", base=2)
-        left.legend(fontsize=8)
+        left.set_xticks(SIDES, [str(side) for side in SIDES])
+        left.set(xlabel="side of the squares, pixels", ylim=(0.3, 1))
+        left.set_ylabel("rank correlation with the true error")
+        left.legend(fontsize=8, loc="lower right")
         values = [mean["oracle"], *(mean.get(f"{name} error", np.nan) for name in CRITERIA)]
         right.bar(["oracle", *CRITERIA], values)
         right.axhline(1, color="grey", linewidth=1)

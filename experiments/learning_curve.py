@@ -13,7 +13,7 @@ from jflnr.flnr.train import CONFIGS, Settings, train
 
 NAME = "learning_curve"
 QUESTION = "What do more scenes, and more views of them, bring the network?"
-MINUTES = 30
+MINUTES = 17
 
 STEPS, EVERY = 1200, 100
 # Name of the part: share of the scenes, views of each at most.

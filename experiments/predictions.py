@@ -21,7 +21,7 @@ from jflnr.selection.method import denoise_on_blocks
 
 NAME = "predictions"
 QUESTION = "How well does a look at a frame tell what each form of method auto reaches?"
-MINUTES = 20
+MINUTES = 4
 
 # The first view of every rendered training scene, beside those of the data folder.
 RENDERED = "*_100.exr"
