@@ -17,7 +17,7 @@ from jflnr.inputs import frame_inputs
 
 NAME = "finetune"
 QUESTION = "What do two noisy renders of each frame teach a network about a scene?"
-MINUTES = 30
+MINUTES = 3
 
 METHOD = "flnr-tiny"
 STEPS, EVERY = 120, 30
