@@ -21,12 +21,12 @@ from jflnr.metrics import display, exposure
 
 NAME = "large"
 QUESTION = "What do large frames take, in memory and in time, whole and in pieces?"
-MINUTES = 18
+MINUTES = 20
 
 METHODS = ("flr", "flr-adaptive", "flnr")
 # Pixels of the frames whose memory is measured, and what they may take in pieces.
 SIZES = ((1080, 1920), (2160, 3840), (4320, 7680))
-MEMORY = "1800M"
+MEMORY = "2300M"
 # A frame that does not fit, and the methods of which a crop can be denoised by itself.
 LARGEST, LARGEST_MEMORY = (8192, 16384), "4G"
 CROPPED = ("flr", "flr-adaptive")

@@ -15,7 +15,7 @@ from jflnr.frame import Frame
 
 NAME = "sequences"
 QUESTION = "Who is stable over time and stays near the truth, whatever moves?"
-MINUTES = 12
+MINUTES = 10
 
 SETTLED = 8  # frames after which means over a sequence begin
 REFERENCE = "reference"

@@ -90,14 +90,13 @@ def methods() -> list[Method]:
         Method(m, "alone", functools.partial(each, functools.partial(jflnr.denoise, method=m)))
         for m in ("flr", "flr-adaptive", "flnr")
     ]
+    tuned = functools.partial(svgf.step, **svgf.TUNED_OVER_TIME)
     ours = [Method(f"{m}, temporal", "ours", with_history(m)) for m in sequence.METHODS]
     peers = [
         Method("BMFR", "peer", in_steps(bmfr.start, bmfr.step)),
         Method("BMFR without TAA", "peer", in_steps(bmfr.start, without_taa)),
         Method("SVGF", "peer", in_steps(svgf.start, svgf.step)),
-        Method(
-            "SVGF, tuned", "peer", in_steps(svgf.start, functools.partial(svgf.step, **svgf.TUNED))
-        ),
+        Method("SVGF, tuned", "peer", in_steps(svgf.start, tuned)),
     ]
     oidn = [
         Method("OIDN", "peer", functools.partial(each, denoise))

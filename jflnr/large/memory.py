@@ -14,8 +14,9 @@ SHARE = 0.5
 # Measured (docs/large.md): what the program takes before any frame; bytes per pixel of a frame that
 # is denoised whole, of a frame that waits in pieces, and of a piece with what it overlaps.
 BASE = 450 * 2**20
-WHOLE, REST = 320, 1
-PIECE = {"flr": 230, "flr-adaptive": 160}
+WHOLE = 320
+REST = {"flr": 1, "flr-adaptive": 1, "flnr": 14}
+PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 230}
 # Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` and `flnr` do.
 STRIP_OVERLAP, TILE_OVERLAP, NETWORK_OVERLAP = 200, 1664, 2048
 # Smaller pieces would be nearly all overlap.
@@ -59,8 +60,9 @@ def tile_for(
     if BASE + at_once * WHOLE * pixels <= memory:
         return None
     side = 0.0
-    area = (memory - BASE - REST * pixels) / PIECE.get(method, max(PIECE.values()))
-    if method == "flr":
+    kind = _kind(method)
+    area = (memory - BASE - REST[kind] * pixels) / PIECE[kind]
+    if kind == "flr":
         side = max(area - STRIP_OVERLAP * width, 0) ** 0.5
     elif area > 0:
         side = area**0.5 - _tile_overlap(method)
@@ -78,7 +80,13 @@ def _least(pixels: int, width: int, method: str) -> int:
         area = SMALLEST**2 + STRIP_OVERLAP * width
     else:
         area = (SMALLEST + _tile_overlap(method)) ** 2
-    return BASE + REST * pixels + PIECE.get(method, max(PIECE.values())) * area
+    kind = _kind(method)
+    return BASE + REST[kind] * pixels + PIECE[kind] * area
+
+
+def _kind(method: str) -> str:
+    """The method whose memory this one's is like."""
+    return method if method in PIECE else "flnr"
 
 
 def _tile_overlap(method: str) -> int:

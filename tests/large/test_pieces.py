@@ -141,8 +141,8 @@ def test_what_is_no_size_is_named(text):
 def test_larger_frames_come_in_smaller_pieces(method):
     gigabyte = 1 << 30
     assert memory.tile_for(1080, 1920, 4 * gigabyte, method=method) is None
-    large = memory.tile_for(8192, 16384, 4 * gigabyte, method=method)
-    larger = memory.tile_for(16384, 32768, 4 * gigabyte, method=method)
+    large = memory.tile_for(4096, 8192, 4 * gigabyte, method=method)
+    larger = memory.tile_for(8192, 16384, 4 * gigabyte, method=method)
     assert large > larger > 0
     with pytest.raises(ValueError, match="too little for 16384 x 8192 pixels"):
         memory.tile_for(8192, 16384, gigabyte // 2, method=method)
