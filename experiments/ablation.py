@@ -25,7 +25,7 @@ from jflnr.metrics import measure
 
 NAME = "ablation"
 QUESTION = "What does each part of adaptive FLR bring, in quality, energy and time?"
-MINUTES = 20
+MINUTES = 10
 
 COUNTS = (1, 4, 16)
 METRICS = ("psnr", "ssim", "flip")
