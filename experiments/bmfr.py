@@ -19,7 +19,7 @@ from jflnr.temporal.bmfr import BmfrParameters
 
 NAME = "bmfr"
 QUESTION = "Where does BMFR's time go, do both back ends agree, and what is its noise for?"
-MINUTES = 10
+MINUTES = 1
 
 WIDTH, HEIGHT = 1280, 720
 BLOCKS = (16, 32, 64)

@@ -24,13 +24,13 @@ MEAN_BRIGHTNESS, GAMMA = 0.35, 2.2
 COLLECTED = {"blocks-16": 8, "blocks-8": 4, "blocks-4": 4}
 BLOCKS = tuple(COLLECTED)
 FORMS = (*BLOCKS, "flnr")
-# Time per pixel, in that of plain FLR with five guides.
-COSTS = dict(zip(FORMS, (1.1, 1.9, 3.0, 4.4), strict=True))
+# Time per pixel, in that of plain FLR with five guides (the experiment `parsimony`).
+COSTS = dict(zip(FORMS, (1.6, 2.9, 4.3, 4.6), strict=True))
 # What looking at a frame by a form has cost when a larger one is taken after all that does not
 # go on from it.
-LOOKS = {"blocks-16": 0.8, "blocks-8": 1.6}
+LOOKS = {"blocks-16": 1.1, "blocks-8": 2.4}
 # Decibels that a form must bring for each further FLR of time.
-PRICE = 0.1
+PRICE = 0.08
 # A guide is read at every pixel if inside blocks it does more than this share of the squared error.
 WORTH = 1e-4
 
