@@ -18,7 +18,8 @@ WHOLE = 320
 REST = {"flr": 1, "flr-adaptive": 1, "flnr": 14}
 PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 230}
 # Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` and `flnr` do.
-STRIP_OVERLAP, TILE_OVERLAP, NETWORK_OVERLAP = 200, 1664, 2048
+STRIP_OVERLAP = 200
+TILE_OVERLAP = {"flr-adaptive": 1664, "flnr": 2048}
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
 # The name that glibc's <malloc.h> gives what `keep_freed` sets, and bytes that are kept.
@@ -65,7 +66,7 @@ def tile_for(
     if kind == "flr":
         side = max(area - STRIP_OVERLAP * width, 0) ** 0.5
     elif area > 0:
-        side = area**0.5 - _tile_overlap(method)
+        side = area**0.5 - TILE_OVERLAP[kind]
     if side < SMALLEST:
         raise ValueError(
             f"--memory: {memory / 2**20:.0f}M are too little for {width} x {height} pixels with "
@@ -76,18 +77,14 @@ def tile_for(
 
 def _least(pixels: int, width: int, method: str) -> int:
     """Bytes that the smallest pieces take."""
-    if method == "flr":
+    kind = _kind(method)
+    if kind == "flr":
         area = SMALLEST**2 + STRIP_OVERLAP * width
     else:
-        area = (SMALLEST + _tile_overlap(method)) ** 2
-    kind = _kind(method)
+        area = (SMALLEST + TILE_OVERLAP[kind]) ** 2
     return BASE + REST[kind] * pixels + PIECE[kind] * area
 
 
 def _kind(method: str) -> str:
     """The method whose memory this one's is like."""
     return method if method in PIECE else "flnr"
-
-
-def _tile_overlap(method: str) -> int:
-    return TILE_OVERLAP if method == "flr-adaptive" else NETWORK_OVERLAP

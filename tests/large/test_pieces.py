@@ -137,12 +137,12 @@ def test_what_is_no_size_is_named(text):
         memory.parse(text)
 
 
-@pytest.mark.parametrize("method", ["flr", "flr-adaptive", "flnr"])
-def test_larger_frames_come_in_smaller_pieces(method):
+@pytest.mark.parametrize(("method", "gigabytes"), [("flr", 4), ("flr-adaptive", 4), ("flnr", 12)])
+def test_larger_frames_come_in_smaller_pieces(method, gigabytes):
     gigabyte = 1 << 30
     assert memory.tile_for(1080, 1920, 4 * gigabyte, method=method) is None
-    large = memory.tile_for(4096, 8192, 4 * gigabyte, method=method)
-    larger = memory.tile_for(8192, 16384, 4 * gigabyte, method=method)
+    large = memory.tile_for(8192, 16384, gigabytes * gigabyte, method=method)
+    larger = memory.tile_for(16384, 32768, gigabytes * gigabyte, method=method)
     assert large > larger > 0
     with pytest.raises(ValueError, match="too little for 16384 x 8192 pixels"):
         memory.tile_for(8192, 16384, gigabyte // 2, method=method)
