@@ -18,7 +18,7 @@ from jflnr.metrics import measure
 
 NAME = "spp"
 QUESTION = "How does each method gain from more samples per pixel?"
-MINUTES = 10
+MINUTES = 13
 
 # Independent streams of the files that together make so many samples per pixel.
 STREAMS = {"1": (1,), "4": (4,), "5": (1, 4), "16": (16,), "20": (4, 16)}
