@@ -2,6 +2,7 @@
 
 import gc
 import os
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,13 @@ from jflnr.frame import Frame, write_frame
 def pytest_configure(config: pytest.Config) -> None:
     # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
     config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
+    # Many tests need the same programs, and those of FLNR take a minute to compile. Processes that
+    # tests start find the folder in their environment.
+    if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
+        programs = tempfile.TemporaryDirectory()
+        config.add_cleanup(programs.cleanup)
+        os.environ["JAX_COMPILATION_CACHE_DIR"] = programs.name
+    jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
 
 
 @pytest.fixture(autouse=True, scope="module")

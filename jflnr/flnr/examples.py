@@ -15,6 +15,7 @@ import numpy as np
 
 from jflnr import exr
 from jflnr.flnr import features, method
+from jflnr.flnr.augment import augment
 from jflnr.flnr.regression import Prepared
 from jflnr.frame import Frame, read_frame
 from jflnr.inputs import frame_inputs
@@ -121,7 +122,8 @@ def _wanted(crop: Crop) -> np.ndarray:
 
 
 def draw(crop: Crop, random: np.random.Generator) -> Example:
-    """The crop under a new realisation of the noise, mixed from those that there are."""
+    """The crop under a new realisation of the noise, mixed from those that there are; mirrored and
+    recoloured."""
     counts = sorted(crop.light)
     shares = np.array([SHARES[spp] for spp in counts])
     layers = crop.light[counts[random.choice(len(counts), p=shares / shares.sum())]]
@@ -129,10 +131,11 @@ def draw(crop: Crop, random: np.random.Generator) -> Example:
     if target is None:
         layers = random.permutation(layers)
         layers, target = layers[1:], layers[0].astype(np.float32)
-    frame = dataclasses.replace(crop.frame, indirect=mixed(layers, random))
+    frame = dataclasses.replace(crop.frame, indirect=mixed(layers, random), reference=target)
+    frame = augment(frame, random)
     known, shift, guides = prepared(frame)
-    exposure = np.float32(MEAN_BRIGHTNESS / np.mean(frame.albedo * _wanted(crop)))
-    target = np.clip(np.asarray(frame.albedo) * target * exposure, 0, 1e4)
+    exposure = np.float32(MEAN_BRIGHTNESS / np.mean(crop.frame.albedo * _wanted(crop)))
+    target = np.clip(np.asarray(frame.albedo) * frame.reference * exposure, 0, 1e4)
     return Example(known, shift, guides, frame.albedo, target, exposure)
 
 

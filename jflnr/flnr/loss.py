@@ -18,7 +18,9 @@ DARKEST = 1e-3
 
 def light(params: unet.Params, example: Example) -> jax.Array:
     """The denoised light of one example, `(H, W, 3)`."""
-    return regression.evaluate(params, example.prepared, example.shift, example.guides)
+    known = example.prepared
+    says = regression.heard(params, known)
+    return regression.evaluate(says, known, example.shift, example.guides)
 
 
 def to_reference(params: unet.Params, example: Example) -> jax.Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 
 import jax
@@ -39,7 +38,9 @@ def denoise_flnr(
 
         images = adaptive_images(frame, features.GUIDES, smooth=opencl.smooth_guide)
         return opencl.flnr(params=params, keep_energy=keep_energy, **images)
-    return _finished(params, *prepared(frame), frame, keep_energy)
+    known, shift, guides = prepared(frame)
+    image = evaluate(heard(params, known), known, shift, guides)
+    return _with_energy(image, frame) if keep_energy else image
 
 
 def check(
@@ -63,24 +64,18 @@ def check(
 def prepared(frame: Frame) -> tuple[regression.Prepared, jax.Array, Guides]:
     """What precedes the network, the shift of the guides and the guides themselves.
 
-    A program of its own, which networks of all sizes share.
+    A program of its own, as is what follows the network: networks of all sizes share both.
     """
     images = adaptive_images(frame, features.GUIDES)
     guides = images["guides"]
     return *regression.prepare(images["target"], guides, images["weight"]), guides
 
 
-@functools.partial(jax.jit, static_argnames="keep_energy")
-def _finished(
-    params: unet.Params,
-    known: regression.Prepared,
-    shift: jax.Array,
-    guides: Guides,
-    frame: Frame,
-    keep_energy: bool,
-) -> jax.Array:
-    image = regression.evaluate(params, known, shift, guides)
-    if not keep_energy:
-        return image
+heard = jax.jit(regression.heard)
+evaluate = jax.jit(regression.evaluate)
+
+
+@jax.jit
+def _with_energy(image: jax.Array, frame: Frame) -> jax.Array:
     weight = None if frame.mask is None else jnp.asarray(frame.mask[..., 0] > 0)
     return rescale(image, light_of(jnp.asarray(frame.indirect)), weight)

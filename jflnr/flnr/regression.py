@@ -1,9 +1,10 @@
-"""FLNR: the pyramid of adaptive FLR, merged and corrected by a small network (section 3.3).
+"""FLNR: the pyramid of adaptive FLR under windows that a small network steers (section 3.3).
 
 The paper's network gives the regression better guides at every pixel. One sample per pixel is so
 sparse that most of what such a network does is averaging, which the pyramid does already. So here
-the regression comes first, at four widths, and the network reads what the fits found on blocks:
-it says how much of each finer fit is signal, and where the light is too much or missing (shadows
+a first regression comes before the network, which reads on blocks what its fits found. It says for
+every block what else must be alike in a window, how wide the window is and how much the block
+counts, and the fits are made anew; and it says where their light is too much or missing (shadows
 that no guide shows, fireflies). It ends in zeros before training: FLNR then is adaptive FLR.
 """
 
@@ -22,35 +23,36 @@ from jflnr.flr.apply import apply, with_borders
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import restoring_factor
 from jflnr.flr.floor import with_own_light
-from jflnr.flr.level import Fit, mean_guides
+from jflnr.flr.level import Grid, mean_guides
 from jflnr.flr.moments import Guides, centre, index_xy, magnitude
-from jflnr.flr.pyramid import double
+from jflnr.flr.pyramid import halve
 
 # Side in pixels of the finest blocks.
 BLOCK = 4
-# Logarithms of the largest gain of a block, and of the largest change of a share's odds.
-LARGEST_GAIN, LARGEST_CHANGE = 2.0, 3.0
+# Planes in which the blocks of a window must be alike: the guides and the brightness.
+ALIKE = 6
+# Logarithms of the largest factors on a block's gain, on what it counts and on its window's width.
+LARGEST_GAIN, LARGEST_WEIGHT, LARGEST_WIDTH = 2.0, 2.0, 0.7
 
 
 class Prepared(NamedTuple):
-    """A frame after its regressions: what the network reads, and what it steers.
+    """A frame after its first regression: what the network reads, and what it steers.
 
-    Nothing in it depends on the network's weights, so training makes it once.
+    Nothing in it depends on the network's weights.
 
-    x: `(ceil(h / 2), ceil(w / 2), features.COUNT)`, where `(h, w)` are the finest blocks.
-    coarsest: `(Q + 1, C, h', w')`, models of the coarsest grid. differences, shares: coarse to
-    fine, what each finer fit adds and how much of it the variances call signal. guides:
-    `(Q + 1, h, w)`, means of the finest blocks. factor: `(h, w)`, which gives back brightness that
-    the weights took. mean: brightness of the frame.
+    x: `(ceil(h / 2), ceil(w / 2), features.COUNT)`, where `(h, w)` are the finest blocks. moments:
+    `(K, h, w)`, of these. noise: `(1, h, w)`, mean squares of the weighted residuals. factor:
+    `(h, w)`, which gives back brightness that the weights took. mean: brightness of the frame.
+    dark: light that a gain acts on even where the models predict none. unit: of light.
     """
 
     x: jax.Array
-    coarsest: jax.Array
-    differences: tuple[jax.Array, ...]
-    shares: tuple[jax.Array, ...]
-    guides: jax.Array
+    moments: jax.Array
+    noise: jax.Array
     factor: jax.Array
     mean: jax.Array
+    dark: jax.Array
+    unit: jax.Array | float
 
 
 def flnr(
@@ -65,16 +67,12 @@ def flnr(
     """
     check_regression(target, guides, None, weight, 2 * BLOCK, 1)
     frame, shift = prepare(target, guides, weight)
-    return evaluate(params, frame, shift, guides)
+    return evaluate(heard(params, frame), frame, shift, guides)
 
 
-def init(key: jax.Array, widths: Sequence[int], channels: int = 3) -> unet.Params:
-    """Weights with which FLNR is adaptive FLR. widths: channels of the network, fine to coarse.
-
-    It gives a change of share per block of the three finest grids, and a gain for each channel per
-    block of the finest.
-    """
-    return unet.init(key, features.COUNT, widths, (4 * (1 + channels) + 1, 1))
+def init(key: jax.Array, widths: Sequence[int]) -> unet.Params:
+    """Weights with which FLNR is adaptive FLR. widths: channels of the network, fine to coarse."""
+    return unet.init(key, features.COUNT, widths, (4 * (ALIKE + 2 + features.CHANNELS),))
 
 
 def prepare(
@@ -89,60 +87,71 @@ def prepare(
     models = adaptive.fit_pilot(moments, mean, shift, numbers, BLOCK)
     pilot = adaptive.Pilot(with_borders(models), mean)
     grid = adaptive.collect_grid(target, guides, shift, pilot, weight, numbers, BLOCK, unit)
-    coarsest, steps = widths.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
+    _, steps = widths.fit_levels(grid, shift, features.CHANNELS, adaptive.LEVELS, mean, numbers)
     factor = restoring_factor(steps[-1].merged, moments, shift.size, numbers.slack)
     x = features.of_steps(steps, shift.size, mean, None)
-    known = prepared(x, coarsest, steps, factor, mean)
     # Without light there is none for the gain to act on, either.
     lit = jnp.sum(moments[index_xy(0, 0, shift.size, 1)]) > 0
-    known = known._replace(
-        coarsest=unit * known.coarsest,
-        differences=tuple(unit * difference for difference in known.differences),
-        mean=jnp.where(lit, unit * mean, 0),
+    dark = jnp.where(lit, features.DARK * mean, 0)
+    return Prepared(x, grid.moments, grid.noise, factor, mean, dark, unit), shift
+
+
+class Heard(NamedTuple):
+    """What the network says of the finest blocks; 0 everywhere changes nothing.
+
+    alike: `(ALIKE, h, w)`, added to what must be alike in a window. wider, weight: `(h, w)`,
+    logarithms of factors on the window's width and on what the block counts in windows. gain:
+    `(C, h, w)`, logarithm of a factor on the light.
+    """
+
+    alike: jax.Array
+    wider: jax.Array
+    weight: jax.Array
+    gain: jax.Array
+
+
+def heard(params: unet.Params, frame: Prepared) -> Heard:
+    """Let the network read the frame."""
+    planes = unet.unpack(unet.apply(params, frame.x)[0], *frame.factor.shape)
+    return Heard(
+        alike=planes[:ALIKE],
+        wider=_within(planes[ALIKE], LARGEST_WIDTH),
+        weight=_within(planes[ALIKE + 1], LARGEST_WEIGHT),
+        gain=_within(planes[ALIKE + 2 :], LARGEST_GAIN),
     )
-    return known, shift
 
 
-def prepared(
-    x: jax.Array, coarsest: Fit, steps: list[widths.Step], factor: jax.Array, mean: jax.Array
-) -> Prepared:
-    """What the network reads and steers, from the fits of all levels."""
-    return Prepared(
-        x=x,
-        coarsest=coarsest.coefficients,
-        differences=tuple(s.fine.coefficients - s.coarse.coefficients for s in steps),
-        shares=tuple(step.share for step in steps),
-        guides=mean_guides(steps[-1].grid.moments, coarsest.coefficients.shape[0] - 1),
-        factor=factor,
-        mean=mean,
+def finish(says: Heard, frame: Prepared, shift: jax.Array) -> jax.Array:
+    """Fit anew and correct the light as the network says: models `(Q + 1, C, h, w)`."""
+    weight = jnp.exp(says.weight)
+    grid = Grid(frame.moments * weight, frame.noise * weight**2, BLOCK)
+    # Coarser blocks are steered by the mean of the finest in them.
+    planes = jnp.concatenate([says.alike, says.wider[None]])
+    said = list[widths.Said]()
+    for _ in range(adaptive.LEVELS):
+        said.append(widths.Said(planes[:-1], jnp.exp(planes[-1])))
+        planes = halve(planes)
+    levels = widths.fit_levels(
+        grid,
+        shift,
+        features.CHANNELS,
+        adaptive.LEVELS,
+        frame.mean,
+        ADAPTIVE_DEFAULT.numbers(),
+        said,
     )
+    merged = widths.merged_models(*levels) * frame.factor
+    gain = jnp.exp(says.gain)
+    light = (merged[:1] + frame.dark) * gain - frame.dark
+    return jnp.concatenate([light, merged[1:] * gain])
 
 
-def finish(params: unet.Params, frame: Prepared) -> jax.Array:
-    """Merge the levels and correct the light as the network says: `(Q + 1, C, h, w)`."""
-    first, second = unet.apply(params, frame.x)[:2]
-    finest = unet.unpack(first[..., :-1], *frame.factor.shape)
-    merged = frame.coarsest
-    changes = (second[..., 0], first[..., -1], finest[0])
-    for difference, share, change in zip(frame.differences, frame.shares, changes, strict=True):
-        merged = double(merged, *share.shape) + changed(share, change) * difference
-    merged = merged * frame.factor
-    gain = jnp.exp(_within(finest[1:], LARGEST_GAIN))
-    # A gain acts on a little light even where the models predict none.
-    floor = features.DARK * frame.mean
-    return jnp.concatenate([(merged[:1] + floor) * gain - floor, merged[1:] * gain])
-
-
-def evaluate(params: unet.Params, frame: Prepared, shift: jax.Array, guides: Guides) -> jax.Array:
-    """The denoised light `(H, W, C)` of a frame from `prepare`."""
-    coefficients = with_own_light(finish(params, frame), frame.guides)
-    return apply(coefficients, guides, shift, BLOCK, ADAPTIVE_DEFAULT.numbers().floor)
-
-
-def changed(share: jax.Array, change: jax.Array) -> jax.Array:
-    """A share whose odds, share : 1 - share, are multiplied by exp(change); within [0, 1]."""
-    odds = jnp.exp(_within(change, LARGEST_CHANGE))
-    return share * odds / (1 + share * (odds - 1))
+def evaluate(says: Heard, frame: Prepared, shift: jax.Array, guides: Guides) -> jax.Array:
+    """The denoised light `(H, W, C)` of a frame from `prepare`, as the network says."""
+    means = mean_guides(frame.moments, shift.size)
+    coefficients = with_own_light(finish(says, frame, shift), means)
+    floor = ADAPTIVE_DEFAULT.numbers().floor
+    return apply(coefficients, guides, shift, BLOCK, floor) * frame.unit
 
 
 def _within(x: jax.Array, limit: float) -> jax.Array:

@@ -14,9 +14,8 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from jflnr import metrics
-from jflnr.flnr import loss, regression, unet
+from jflnr.flnr import loss, method, regression, unet
 from jflnr.flnr.adam import Adam
-from jflnr.flnr.augment import augment
 from jflnr.flnr.checkpoint import load_state, save_state
 from jflnr.flnr.examples import Crop, Example, draw, prepared
 from jflnr.frame import Frame
@@ -119,10 +118,8 @@ def rate_of(settings: Settings) -> Callable[[jax.Array], jax.Array]:
 def _batch_loss(settings: Settings) -> Callable[..., jax.Array]:
     one = loss.to_noisy if settings.noisy_targets else loss.to_reference
 
-    def mean(params: unet.Params, data: tuple[jax.Array, Example]) -> jax.Array:
-        keys, examples = data
-        examples = jax.vmap(augment)(keys, examples)
-        return jnp.mean(jax.vmap(one, in_axes=(None, 0))(params, examples))
+    def mean(params: unet.Params, data: Example) -> jax.Array:
+        return jnp.mean(jax.vmap(one, in_axes=(None, 0))(params, data))
 
     return mean
 
@@ -148,19 +145,16 @@ class Batches:
     def __exit__(self, *error: object) -> None:
         self.pool.shutdown(cancel_futures=True)
 
-    def __call__(self, step: int) -> tuple[jax.Array, Example]:
-        """Keys and examples of this step, on the devices."""
+    def __call__(self, step: int) -> Example:
+        """The examples of this step, on the devices."""
         draw = self.next.pop(step, None) or self.pool.submit(self._draw, step)
         self.next[step + 1] = self.pool.submit(self._draw, step + 1)
         return jax.device_put(draw.result(), self.sharding)
 
-    def _draw(self, step: int) -> tuple[np.ndarray, Example]:
+    def _draw(self, step: int) -> Example:
         random = np.random.default_rng([self.settings.seed, step])
         chosen = random.choice(len(self.crops), self.settings.batch)
-        keys = random.integers(2**32, size=(self.settings.batch, 2), dtype=np.uint32)
-        return keys, jax.tree.map(
-            lambda *a: np.stack(a), *(draw(self.crops[i], random) for i in chosen)
-        )
+        return jax.tree.map(lambda *a: np.stack(a), *(draw(self.crops[i], random) for i in chosen))
 
 
 class Validation:
@@ -168,7 +162,6 @@ class Validation:
 
     def __init__(self, frames: Sequence[Frame]) -> None:
         self.known = [(frame, prepared(frame)) for frame in frames]
-        self.image = jax.jit(regression.evaluate)
 
     def __call__(self, params: unet.Params) -> float:
         """In dB, by the protocol of DESIGN.md; NaN without frames."""
@@ -183,7 +176,8 @@ class Validation:
         shift: np.ndarray,
         guides: np.ndarray,
     ) -> float:
-        light = np.asarray(self.image(params, known, shift, guides), np.float64)
+        says = method.heard(params, known)
+        light = np.asarray(method.evaluate(says, known, shift, guides), np.float64)
         albedo, reference = np.asarray(frame.albedo), np.asarray(frame.reference)
         wanted = albedo * reference.astype(np.float64)
         scale = metrics.exposure(wanted)

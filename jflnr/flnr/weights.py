@@ -19,7 +19,7 @@ import numpy as np
 from jflnr.files import replacing
 from jflnr.flnr import features, regression, unet
 
-FORMAT, VERSION = "jflnr network", 1
+FORMAT, VERSION = "jflnr network", 2
 # More than any network here has; a file that says it unpacks to more is not read.
 LARGEST = 64 * 2**20
 FOLDER = Path(__file__).parent / "weights"

@@ -97,6 +97,7 @@ def windowed(
     numbers: AdaptiveParameters,
     *,
     slopes: bool = True,
+    wider: jax.Array | float = 1.0,
 ) -> Windowed:
     """The normal equations of one level.
 
@@ -104,10 +105,11 @@ def windowed(
     window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
 
     features: `(F, h, w)`, what must be alike in a window. mean: brightness of the whole frame.
-    slopes: whether the position in the window is a guide too.
+    slopes: whether the position in the window is a guide too. wider: `(h, w)`, factor on the width
+    of each block's window.
     """
     guides, positions = shift.size, 2 if slopes else 0
-    window = window_over(features, numbers.sigma)
+    window = window_over(features, numbers.sigma * wider)
     moments = (
         gather_moments(grid.moments, window, numbers.sigma, guides, channels)
         if slopes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -11,6 +12,17 @@ from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict, windowed
 from jflnr.flr.merge import interpolate, signal_share
 from jflnr.flr.pyramid import double, halve
+
+
+class Said(NamedTuple):
+    """What a network says of the windows of one grid.
+
+    alike: `(E, h, w)`, added to what must be alike in a window, which is no more than E planes.
+    wider: `(h, w)`, factor on the width of each block's window.
+    """
+
+    alike: jax.Array
+    wider: jax.Array
 
 
 class Step(NamedTuple):
@@ -41,21 +53,27 @@ def fit_levels(
     levels: int,
     mean: jax.Array,
     numbers: AdaptiveParameters,
+    said: Sequence[Said] | None = None,
 ) -> tuple[Fit, list[Step]]:
-    """The fit of the coarsest grid, and the steps from there to the finest."""
+    """The fit of the coarsest grid, and the steps from there to the finest.
+
+    said: of every grid, from the finest to the coarsest; None without a network.
+    """
     grids = [grid]
     for _ in range(levels - 1):
         last = grids[-1]
         grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+    heard = list(said) if said is not None else [None] * levels
     features = guide_features(grids[-1], shift.size, numbers)
-    system = windowed(grids[-1], features, shift, channels, mean, numbers)
+    features, wider = _with(heard[-1], features)
+    system = windowed(grids[-1], features, shift, channels, mean, numbers, wider=wider)
     coarsest = coarse = fit_level(system, shift.size, channels)
     merged, steps = coarse.coefficients, list[Step]()
-    for grid in reversed(grids[:-1]):
+    for grid, own in zip(reversed(grids[:-1]), reversed(heard[:-1]), strict=True):
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
         slopes = grid is not grids[0]
-        steps.append(_refine(grid, coarse, merged, shift, channels, mean, numbers, slopes))
+        steps.append(_refine(grid, coarse, merged, shift, channels, mean, numbers, slopes, own))
         coarse, merged = steps[-1].fine, steps[-1].merged
     return coarsest, steps
 
@@ -69,6 +87,7 @@ def _refine(
     mean: jax.Array,
     numbers: AdaptiveParameters,
     slopes: bool,
+    said: Said | None,
 ) -> Step:
     """One level finer: its own fit, and what is merged so far with its share added."""
     size = grid.moments.shape[1:]
@@ -78,12 +97,21 @@ def _refine(
     # Windows end where what is known so far of the brightness changes.
     edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
     features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    features, wider = _with(said, features)
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes, wider=wider)
     fine = fit_level(system, shift.size, channels)
     reference = level**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     merged = merged + share * (fine.coefficients - coarse.coefficients)
     return Step(grid, fine, coarse, level, share, merged)
+
+
+def _with(said: Said | None, features: jax.Array) -> tuple[jax.Array, jax.Array | float]:
+    """What must be alike, `(F, h, w)`, and the factor on the width."""
+    if said is None:
+        return features, 1.0
+    more = [(0, len(said.alike) - len(features)), (0, 0), (0, 0)]
+    return said.alike + jnp.pad(features, more), said.wider
 
 
 def guide_features(grid: Grid, guides: int, numbers: AdaptiveParameters) -> jax.Array:

@@ -16,7 +16,7 @@ import numpy as np
 from jflnr.flnr import features, regression, unet
 from jflnr.flr import adaptive, energy, widths
 from jflnr.flr.floor import with_own_light
-from jflnr.flr.level import Grid
+from jflnr.flr.level import Grid, mean_guides
 from jflnr.large.planes import Planes
 from jflnr.large.pyramid import REACH, Job
 from jflnr.large.steps import Common
@@ -52,8 +52,9 @@ def correct(
     how much brightness is given back.
     """
     scales = sum(name.startswith("encode") and name[-1].isdigit() for name in params)
-    # Six blocks of the coarsest scale, each twice the finest, are more than all convolutions reach.
-    reach = REACH + 6 * 2**scales
+    # Six blocks of the coarsest scale, each twice the finest, are more than all convolutions reach;
+    # before them and after them all levels are fitted.
+    reach = 2 * REACH + 6 * 2**scales
     known = Known(mean, bool(output.any()), rate, _means(job, moments, models, mean))
     for across, along in job.tiles(job.block, reach, max(ALIGN, 2**scales)):
         y, x = across.on(2), along.on(2)
@@ -89,12 +90,11 @@ def _models(
     grid = Grid(moments[:-1], moments[-1:], block)
     guides, channels = common.shift.size, features.CHANNELS
     numbers = common.numbers
-    coarsest, steps = widths.fit_levels(
-        grid, common.shift, channels, adaptive.LEVELS, known.mean, numbers
-    )
+    _, steps = widths.fit_levels(grid, common.shift, channels, adaptive.LEVELS, known.mean, numbers)
     factor = energy.scale(jnp.ones((1, 1, *moments.shape[1:])), output, known.rate)[0, 0]
     x = features.of_steps(steps, guides, known.mean, tuple(known.means))
     # Without light there is none for the gain to act on, either.
-    mean = jnp.where(known.lit, known.mean, 0)
-    frame = regression.prepared(x, coarsest, steps, factor, mean)
-    return with_own_light(regression.finish(params, frame), frame.guides)
+    dark = jnp.where(known.lit, features.DARK * known.mean, 0)
+    frame = regression.Prepared(x, grid.moments, grid.noise, factor, known.mean, dark, 1.0)
+    models = regression.finish(regression.heard(params, frame), frame, common.shift)
+    return with_own_light(models, mean_guides(grid.moments, guides))

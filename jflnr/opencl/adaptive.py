@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -18,11 +19,24 @@ from jflnr.opencl.context import Context, default_context, is_device_array
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
 from jflnr.opencl.grids import Grid, Run
-from jflnr.opencl.level import fit_level
+from jflnr.opencl.level import Alike, Level, Steer, fit_level
 from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.pyramid import halve, halve_planes
 from jflnr.opencl.weighted_moments import collect_weighted
+
+
+class Step(NamedTuple):
+    """One level finer than what was known before; see `jflnr.flr.widths.Step`.
+
+    fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
+    coarser grid.
+    """
+
+    fine: Level
+    coarse: Level
+    share: Grid
+
 
 # Light above this is divided by a power of two first: its squares would leave float32.
 BRIGHT = 1e15
@@ -105,7 +119,7 @@ def _denoise(
     run = Run(context, count, channels, numbers, shift, mean)
     pilot = fit_pilot(run, moments, w, block)
     grid = collect_weighted(run, target, guides, pilot, weight, block)
-    merged = fit_pyramid(run, grid, block, levels)
+    _, merged = fit_levels(run, grid, block, levels)
     scale, own = restore(run, merged, moments, w), own_light(run, merged, grid)
     restored = Restored(*scale, own, numbers.floor)
     apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
@@ -120,16 +134,34 @@ def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Grid:
     return fit_level(run, halve_planes(run, moments, w), 4 * block).models
 
 
-def fit_pyramid(run: Run, moments: Grid, block: int, levels: int) -> Grid:
-    """Models of the finest grid, put together from all levels. block: side of its blocks."""
+def fit_levels(
+    run: Run,
+    moments: Grid,
+    block: int,
+    levels: int,
+    steers: Sequence[Steer] | None = None,
+) -> tuple[list[Step], Grid]:
+    """The steps from the coarsest grid to the finest, and the models put together from all levels.
+
+    block: side of the finest blocks. steers: what a network makes of the windows of every grid,
+    from the finest to the coarsest.
+    """
     grids = [moments]
     for _ in range(levels - 1):
         grids.append(halve(run, grids[-1]))
-    coarse = fit_level(run, grids[-1], block << (levels - 1))
-    merged = coarse.models
+    steers = [Alike] * levels if steers is None else steers
+    coarse = fit_level(run, grids[-1], block << (levels - 1), steer=steers[-1])
+    steps, merged = list[Step](), coarse.models
     for level in reversed(range(levels - 1)):
-        fine = fit_level(run, grids[level], block << level, merged, slopes=level > 0)
-        share = signal_share(run, fine, coarse)
-        merged = merge(run, fine.models, coarse.models, merged, share)
+        fine = fit_level(
+            run,
+            grids[level],
+            block << level,
+            merged,
+            slopes=level > 0,
+            steer=steers[level],
+        )
+        steps.append(Step(fine, coarse, signal_share(run, fine, coarse)))
+        merged = merge(run, fine.models, coarse.models, merged, steps[-1].share)
         coarse = fine
-    return merged
+    return steps, merged

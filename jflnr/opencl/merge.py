@@ -12,14 +12,14 @@ def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
 
     Means are taken under the windows of the coarser level.
     """
-    options = {"FEATURES": coarse.alike, "FEATURE_PLANES": coarse.features.number}
+    options, windows = coarse.alike.defines(), coarse.alike.grid.planes
     signal = halve(run, _signal(run, fine, coarse, options))
     h, w, pitch = signal.sizes
     rows, share = run.grid(3, h, w), run.grid(1, h, w)
     sizes = h, pitch, run.numbers.sigma
-    along_rows = *sizes, coarse.features.planes, signal.planes, rows.planes
+    along_rows = *sizes, windows, signal.planes, rows.planes
     run.launch("share_rows", "merge.cl", signal, along_rows, COUNT=0, **options)
-    down = *sizes, run.numbers.caution, coarse.features.planes, rows.planes, share.planes
+    down = *sizes, run.numbers.caution, windows, rows.planes, share.planes
     run.launch("share_columns", "merge.cl", signal, down, COUNT=0, **options)
     return share
 

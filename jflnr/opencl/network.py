@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any, NamedTuple
 
@@ -13,23 +14,22 @@ from jflnr.flr.adaptive import LEVELS
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.arguments import channel_count, check_regression
 from jflnr.opencl import network_features, network_unet
-from jflnr.opencl.adaptive import fit_pilot, in_unit
+from jflnr.opencl.adaptive import fit_levels, fit_pilot, in_unit
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import to_layers, to_output, to_weight
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
 from jflnr.opencl.grids import Grid, Run
-from jflnr.opencl.level import fit_level, new_models
-from jflnr.opencl.merge import merge, signal_share
+from jflnr.opencl.level import Alike, new_models
 from jflnr.opencl.moments import centre, collect
-from jflnr.opencl.network_features import Step
 from jflnr.opencl.network_unet import Maps
 from jflnr.opencl.pyramid import halve
 from jflnr.opencl.weighted_moments import collect_weighted
 
 GUIDES = 5
 BLOCK = regression.BLOCK
+FILE = "network/steer.cl"
 
 
 def flnr(
@@ -79,13 +79,13 @@ def flnr(
 
 
 class Prepared(NamedTuple):
-    """A frame after its regressions: what the network reads, and what it steers.
+    """A frame after its first regression: what the network reads, and what it steers.
 
-    steps: coarse to fine. x: what is read. restored: from `energy.restore`.
+    moments: of the finest blocks. x: what is read. restored: from `energy.restore`.
     """
 
     run: Run
-    steps: list[Step]
+    moments: Grid
     x: Maps
     restored: tuple[Any, Any]
 
@@ -98,74 +98,68 @@ def prepare(context: Context, target: Any, guides: tuple[Any, ...], weight: Any 
     numbers = jax.tree.map(lambda number: math.exp(float(number)), ADAPTIVE_DEFAULT)
     run = Run(context, GUIDES, features.CHANNELS, numbers, shift, mean)
     pilot = fit_pilot(run, moments, w, BLOCK)
-    steps, merged = _fit_levels(run, collect_weighted(run, target, guides, pilot, weight, BLOCK))
-    restored = restore(run, merged, moments, w)
-    return Prepared(run, steps, network_features.of_steps(run, steps, merged), restored)
+    grid = collect_weighted(run, target, guides, pilot, weight, BLOCK)
+    steps, merged = fit_levels(run, grid, BLOCK, LEVELS)
+    x = network_features.of_steps(run, steps, merged)
+    return Prepared(run, grid, x, restore(run, merged, moments, w))
 
 
 def finish(params: unet.Params, frame: Prepared) -> tuple[Grid, Grid]:
-    """Merge the levels and correct the light as the network says.
+    """Fit anew and correct the light as the network says.
 
     Returns the models of the finest grid, and the light that each gives its block.
     """
-    run, steps, x, restored = frame
-    said = network_unet.apply(run.context, params, x)
-    merged = steps[0].coarse.models
-    for step, outputs, channel in zip(
-        steps[:-1], said[::-1], (0, said[0].channels - 1), strict=True
-    ):
-        merged = _steer(run, step, outputs, channel, merged)
-    models = _finish(run, steps[-1], said[0], merged, restored)
-    return models, own_light(run, models, steps[-1].fine.moments)
-
-
-def _fit_levels(run: Run, moments: Grid) -> tuple[list[Step], Grid]:
-    """The steps from the coarsest level to the finest, and the models they are merged to."""
-    grids = [moments]
+    run, moments, x, restored = frame
+    said = network_unet.apply(run.context, params, x)[0]
+    says, weighed = _heed(run, said, moments)
+    levels = [says]
     for _ in range(LEVELS - 1):
-        grids.append(halve(run, grids[-1]))
-    coarse = fit_level(run, grids[-1], BLOCK << (LEVELS - 1))
-    steps, merged = list[Step](), coarse.models
-    for level in reversed(range(LEVELS - 1)):
-        fine = fit_level(run, grids[level], BLOCK << level, merged, slopes=level > 0)
-        steps.append(Step(fine, coarse, signal_share(run, fine, coarse)))
-        merged = merge(run, fine.models, coarse.models, merged, steps[-1].share)
-        coarse = fine
-    return steps, merged
+        levels.append(halve(run, levels[-1]))
+    steers = [functools.partial(_steer, run, own) for own in levels]
+    merged = fit_levels(run, weighed, BLOCK, LEVELS, steers)[1]
+    models = _correct(run, said, merged, restored)
+    return models, own_light(run, models, moments)
 
 
-def _steer(run: Run, step: Step, said: Maps, channel: int, merged: Grid) -> Grid:
-    h, w, pitch = step.fine.models.sizes
-    finer = new_models(run, h, w)
+def _heed(run: Run, said: Maps, moments: Grid) -> tuple[Grid, Grid]:
+    """What concerns windows, and the moments that weigh as said."""
+    h, w, pitch = moments.sizes
+    says, weighed = run.grid(regression.ALIKE + 1, h, w), run.grid(moments.number, h, w)
     arguments = (
-        h, pitch, *merged.sizes, said.pitch, channel, said.values, *_models(step, merged),
-        finer.planes,
+        h, w, pitch, said.pitch, said.values, moments.planes, says.planes, weighed.planes,
     )  # fmt: skip
-    run.launch("steer", "network/steer.cl", finer, arguments, **_defines(said))
-    return finer
+    run.launch("heed", FILE, says, arguments, **_defines(said.channels, COUNT=moments.number))
+    return says, weighed
 
 
-def _finish(run: Run, step: Step, said: Maps, merged: Grid, restored: tuple[Any, Any]) -> Grid:
+def _steer(run: Run, says: Grid, features: Grid, count: int) -> Alike:
+    """What decides the windows of a level whose first `count` features must be alike."""
+    h, w, pitch = says.sizes
+    windows = run.grid(says.number, h, w)
+    arguments = h, pitch, features.number, features.planes, says.planes, windows.planes
+    run.launch("steer", FILE, windows, arguments, **_defines(BEFORE=count))
+    return Alike(windows, regression.ALIKE, wider=True)
+
+
+def _correct(run: Run, said: Maps, merged: Grid, restored: tuple[Any, Any]) -> Grid:
     rate, brightness = restored
-    h, w, pitch = step.fine.models.sizes
+    h, w, pitch = merged.sizes
     models = new_models(run, h, w)
     arguments = (
-        h, pitch, *merged.sizes, said.pitch, brightness.shape[1], said.values,
-        *_models(step, merged), run.mean, rate, brightness, models.planes,
+        h, pitch, said.pitch, brightness.shape[1], said.values, merged.planes, run.mean, rate,
+        brightness, models.planes,
     )  # fmt: skip
-    run.launch("finish", "network/steer.cl", models, arguments, **_defines(said))
+    run.launch("correct", FILE, models, arguments, **_defines(said.channels))
     return models
 
 
-def _models(step: Step, merged: Grid) -> tuple[Any, ...]:
-    grids = step.fine.models, step.coarse.models, merged, step.share
-    return tuple(grid.planes for grid in grids)
-
-
-def _defines(said: Maps) -> dict[str, Any]:
+def _defines(outputs: int = 0, **more: int) -> dict[str, Any]:
+    """Those of kernels_cl/network/steer.cl."""
     numbers = {
-        "LARGEST_CHANGE": regression.LARGEST_CHANGE,
+        "LARGEST_WIDTH": regression.LARGEST_WIDTH,
+        "LARGEST_WEIGHT": regression.LARGEST_WEIGHT,
         "LARGEST_GAIN": regression.LARGEST_GAIN,
         "DARK": features.DARK,
     }
-    return {name: f"{number}f" for name, number in numbers.items()} | {"OUTPUTS": said.channels}
+    counts = {"OUTPUTS": outputs, "ALIKE": regression.ALIKE, "COUNT": 0, "BEFORE": 0}
+    return {name: f"{number}f" for name, number in numbers.items()} | counts | more

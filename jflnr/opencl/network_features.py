@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jflnr.flnr.features import BLURS, CHANNELS, COUNT, DARK, MOST_SPREAD, OF_GRID, OF_STEP
+from jflnr.opencl.adaptive import Step
 from jflnr.opencl.grids import GROUP, Grid, Run
-from jflnr.opencl.level import Level
 from jflnr.opencl.network_unet import MARGIN, Maps, new_maps
 from jflnr.opencl.pyramid import halve
 
@@ -21,18 +21,6 @@ DEFINES: dict[str, Any] = {
     "CHANNELS": COUNT,
 }
 PACKED = 4 * (OF_GRID + OF_STEP + CHANNELS)
-
-
-class Step(NamedTuple):
-    """One level finer than what was known before; see `jflnr.flr.widths.Step`.
-
-    fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
-    coarser grid.
-    """
-
-    fine: Level
-    coarse: Level
-    share: Grid
 
 
 def of_steps(run: Run, steps: Sequence[Step], merged: Grid) -> Maps:

@@ -1,6 +1,7 @@
 """Training: its optimiser, its examples, going on after an interruption, several devices."""
 
 import dataclasses
+import itertools
 import os
 import subprocess
 import sys
@@ -10,11 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jflnr import denoise
 from jflnr.flnr import examples as reading
-from jflnr.flnr import loss, regression, train
+from jflnr.flnr import loss, train
 from jflnr.flnr.adam import Adam
-from jflnr.flnr.augment import _mirror, augment
-from tests.flnr.conftest import WIDTHS
+from jflnr.flnr.augment import augment
 
 
 def test_adam_is_the_papers_algorithm():
@@ -48,27 +49,26 @@ def test_a_step_whose_gradient_overflows_is_left_out():
     assert float(moved) == 1
 
 
-def test_augmenting_shows_the_same_scene(example):
-    """Mirrored or recoloured, the untrained denoiser errs as much."""
-    start = regression.init(jax.random.key(0), WIDTHS)
-    plain = float(loss.to_reference(start, example))
-    other = jax.jit(lambda key: augment(key, example))
-    many = [other(jax.random.key(seed)) for seed in range(4)]
-    for changed in many:
-        assert abs(float(loss.to_reference(start, changed)) - plain) < 0.05
-    assert any(np.abs(changed.guides - example.guides).max() > 0.1 for changed in many)
-
-
-def test_augmented_inputs_are_those_of_the_mirrored_frame(scene, example):
-    """What the network reads of a mirrored example is the example's of the mirrored frame."""
-    prepare = jax.jit(lambda target, guides: regression.prepare(target, guides, None)[0])
-    target, guides = (a[:32, :32] for a in scene)
-    mirrored = prepare(target[:, ::-1], guides[:, ::-1])
-    example = example._replace(prepared=prepare(target, guides))
-    ours = _mirror(example, 1, jnp.asarray(True)).prepared
-    # The guides' shift is taken from other pixels, which rounding shows.
-    for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(mirrored), strict=True):
-        np.testing.assert_allclose(mine, other, rtol=1e-2, atol=1e-2 * np.abs(other).max())
+def test_augmented_frames_are_denoised_to_augmented_results(crops):
+    """Mirrored or recoloured first, or denoised first: the same."""
+    frame = dataclasses.replace(crops[0].frame, indirect=np.float32(crops[0].light[1][0]))
+    plain = np.asarray(denoise(frame, "flr-adaptive"))
+    images = (frame.indirect, frame.reference, plain)
+    variants = [
+        tuple(np.flip(image, axes)[..., list(order)] for image in images)
+        for axes in ((), (0,), (1,), (0, 1))
+        for order in itertools.permutations(range(3))
+    ]
+    found = set()
+    for seed in range(5):
+        changed = augment(frame, np.random.default_rng(seed))
+        number = next(i for i, v in enumerate(variants) if np.array_equal(v[0], changed.indirect))
+        np.testing.assert_array_equal(changed.reference, variants[number][1])
+        ours = denoise(changed, "flr-adaptive")
+        # The brightness by which channels are judged knows green from blue.
+        np.testing.assert_allclose(ours, variants[number][2], rtol=0.1, atol=0.1 * plain.max())
+        found.add(number)
+    assert len(found) > 1
 
 
 def test_going_on_gives_the_same_weights(crops, settings, tmp_path):

@@ -8,39 +8,43 @@ from jax.test_util import check_grads
 
 from jflnr.flnr import features, loss, regression, unet
 from jflnr.flnr.examples import Example
+from jflnr.flr.moments import collect
+from tests.opencl.conftest import QUICK
 
-GRIDS = [(6, 8), (3, 4), (2, 2), (1, 1)]
 GUIDES = 5
 
 
 def check(function, *arguments):
     with jax.enable_x64(True):
         arguments = jax.tree.map(lambda a: jnp.asarray(a, jnp.float64), arguments)
-        check_grads(jax.jit(function), arguments, order=1, modes=("rev",), eps=1e-5)
+        function = jax.jit(function, compiler_options=QUICK)
+        check_grads(function, arguments, order=1, modes=("rev",), eps=1e-5)
 
 
 @pytest.fixture
 def example(rng):
-    """24 x 32 pixels with made-up fits."""
+    """24 x 32 pixels with made-up moments."""
 
     def noise(*shape):
         return rng.standard_normal(shape)
 
-    coefficients = [0.2 * noise(GUIDES + 1, 3, *grid) for grid in GRIDS]
-    coefficients[-1][0] += 2
+    shift = 0.3 * noise(GUIDES)
+    target, guides = rng.exponential(1.3, (24, 32, 3)), 0.3 * noise(24, 32, GUIDES)
+    with jax.enable_x64(True):
+        moments = collect(jnp.asarray(target), jnp.asarray(guides), shift, regression.BLOCK)
     known = regression.Prepared(
-        x=noise(*GRIDS[1], features.COUNT),
-        coarsest=coefficients[3],
-        differences=(coefficients[2], coefficients[1], coefficients[0]),
-        shares=tuple(rng.uniform(size=grid) for grid in GRIDS[2::-1]),
-        guides=np.concatenate([np.ones((1, *GRIDS[0])), 0.1 * noise(GUIDES, *GRIDS[0])]),
-        factor=rng.uniform(0.9, 1.1, GRIDS[0]),
+        x=noise(6 // 2, 8 // 2, features.COUNT),
+        moments=np.asarray(moments),
+        noise=rng.uniform(0.5, 1, (1, 6, 8)),
+        factor=rng.uniform(0.9, 1.1, (6, 8)),
         mean=np.array(1.3),
+        dark=np.array(0.04),
+        unit=np.array(2.0),
     )
     return Example(
         prepared=known,
-        shift=noise(GUIDES),
-        guides=noise(24, 32, GUIDES),
+        shift=shift,
+        guides=guides,
         albedo=rng.uniform(0.2, 0.8, (24, 32, 3)),
         target=rng.uniform(0.2, 0.6, (24, 32, 3)),
         exposure=np.array(0.3),
@@ -62,7 +66,13 @@ def test_network(rng):
 
 
 def test_models_by_the_weights(params, example):
-    check(lambda p, known: regression.finish(p, known), params, example.prepared)
+    known, shift = example.prepared, example.shift
+
+    def models(p, moments):
+        frame = known._replace(moments=moments)
+        return regression.finish(regression.heard(p, frame), frame, shift)
+
+    check(models, params, known.moments)
 
 
 def test_what_training_minimises(params, example):
