@@ -24,7 +24,7 @@ from jflnr.temporal.accumulate import nothing
 
 NAME = "accumulated"
 QUESTION = "What is best averaged over time: input, moments, coefficients or output?"
-MINUTES = 30
+MINUTES = 12
 
 VARIANTS = (
     "nothing",

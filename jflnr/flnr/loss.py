@@ -19,7 +19,7 @@ DARKEST = 1e-3
 def light(params: unet.Params, example: Example) -> jax.Array:
     """The denoised light of one example, `(H, W, 3)`."""
     known = example.prepared
-    says = regression.heard(params, known)
+    says = regression.heard(params, known.x, known.size)
     return regression.evaluate(says, known, example.shift, example.guides)
 
 

@@ -71,7 +71,12 @@ def prepared(frame: Frame) -> tuple[regression.Prepared, jax.Array, Guides]:
     return *regression.prepare(images["target"], guides, images["weight"]), guides
 
 
-heard = jax.jit(regression.heard)
+@jax.jit
+def heard(params: unet.Params, known: regression.Prepared) -> regression.Heard:
+    """What the network says; the one program that is a size's own."""
+    return regression.heard(params, known.x, known.size)
+
+
 evaluate = jax.jit(regression.evaluate)
 
 

@@ -31,28 +31,42 @@ from jflnr.flr.pyramid import halve
 BLOCK = 4
 # Planes in which the blocks of a window must be alike: the guides and the brightness.
 ALIKE = 6
+# Planes that the network gives, and where its parts end.
+PLANES, ENDS = ALIKE + 2 + features.CHANNELS, (ALIKE, ALIKE + 1, ALIKE + 2)
 # Logarithms of the largest factors on a block's gain, on what it counts and on its window's width.
 LARGEST_GAIN, LARGEST_WEIGHT, LARGEST_WIDTH = 2.0, 2.0, 0.7
 
 
-class Prepared(NamedTuple):
-    """A frame after its first regression: what the network reads, and what it steers.
+class Steered(NamedTuple):
+    """What the network steers, on the finest blocks, `(h, w)`.
 
-    Nothing in it depends on the network's weights.
-
-    x: `(ceil(h / 2), ceil(w / 2), features.COUNT)`, where `(h, w)` are the finest blocks. moments:
-    `(K, h, w)`, of these. noise: `(1, h, w)`, mean squares of the weighted residuals. factor:
-    `(h, w)`, which gives back brightness that the weights took. mean: brightness of the frame.
-    dark: light that a gain acts on even where the models predict none. unit: of light.
+    moments: `(K, h, w)`, weighted. noise: `(1, h, w)`, mean squares of the weighted residuals.
+    factor: `(h, w)`, which gives back brightness that the weights took. mean: brightness of the
+    frame. dark: light that a gain acts on even where the models predict none.
     """
 
-    x: jax.Array
     moments: jax.Array
     noise: jax.Array
     factor: jax.Array
     mean: jax.Array
     dark: jax.Array
-    unit: jax.Array | float
+
+
+class Prepared(NamedTuple):
+    """A frame after its first regression. Nothing in it depends on the network's weights.
+
+    x: `(ceil(h / 2), ceil(w / 2), features.COUNT)`, what the network reads. unit: of light.
+    """
+
+    x: jax.Array
+    steered: Steered
+    unit: jax.Array
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Of the finest grid."""
+        height, width = self.steered.factor.shape
+        return height, width
 
 
 def flnr(
@@ -67,12 +81,12 @@ def flnr(
     """
     check_regression(target, guides, None, weight, 2 * BLOCK, 1)
     frame, shift = prepare(target, guides, weight)
-    return evaluate(heard(params, frame), frame, shift, guides)
+    return evaluate(heard(params, frame.x, frame.size), frame, shift, guides)
 
 
 def init(key: jax.Array, widths: Sequence[int]) -> unet.Params:
     """Weights with which FLNR is adaptive FLR. widths: channels of the network, fine to coarse."""
-    return unet.init(key, features.COUNT, widths, (4 * (ALIKE + 2 + features.CHANNELS),))
+    return unet.init(key, features.COUNT, widths, (4 * PLANES,))
 
 
 def prepare(
@@ -93,13 +107,14 @@ def prepare(
     # Without light there is none for the gain to act on, either.
     lit = jnp.sum(moments[index_xy(0, 0, shift.size, 1)]) > 0
     dark = jnp.where(lit, features.DARK * mean, 0)
-    return Prepared(x, grid.moments, grid.noise, factor, mean, dark, unit), shift
+    steered = Steered(grid.moments, grid.noise, factor, mean, dark)
+    return Prepared(x, steered, unit), shift
 
 
 class Heard(NamedTuple):
     """What the network says of the finest blocks; 0 everywhere changes nothing.
 
-    alike: `(ALIKE, h, w)`, added to what must be alike in a window. wider, weight: `(h, w)`,
+    alike: `(ALIKE, h, w)`, added to what must be alike in a window. wider, weight: `(1, h, w)`,
     logarithms of factors on the window's width and on what the block counts in windows. gain:
     `(C, h, w)`, logarithm of a factor on the light.
     """
@@ -110,23 +125,24 @@ class Heard(NamedTuple):
     gain: jax.Array
 
 
-def heard(params: unet.Params, frame: Prepared) -> Heard:
-    """Let the network read the frame."""
-    planes = unet.unpack(unet.apply(params, frame.x)[0], *frame.factor.shape)
+def heard(params: unet.Params, x: jax.Array, size: tuple[int, int]) -> Heard:
+    """Let the network read a frame of `size` blocks. x: as of `Prepared`."""
+    planes = unet.unpack(unet.apply(params, x)[0], *size)
+    alike, wider, weight, gain = jnp.split(planes, ENDS)
     return Heard(
-        alike=planes[:ALIKE],
-        wider=_within(planes[ALIKE], LARGEST_WIDTH),
-        weight=_within(planes[ALIKE + 1], LARGEST_WEIGHT),
-        gain=_within(planes[ALIKE + 2 :], LARGEST_GAIN),
+        alike,
+        _within(wider, LARGEST_WIDTH),
+        _within(weight, LARGEST_WEIGHT),
+        _within(gain, LARGEST_GAIN),
     )
 
 
-def finish(says: Heard, frame: Prepared, shift: jax.Array) -> jax.Array:
+def finish(says: Heard, steered: Steered, shift: jax.Array) -> jax.Array:
     """Fit anew and correct the light as the network says: models `(Q + 1, C, h, w)`."""
     weight = jnp.exp(says.weight)
-    grid = Grid(frame.moments * weight, frame.noise * weight**2, BLOCK)
+    grid = Grid(steered.moments * weight, steered.noise * weight**2, BLOCK)
     # Coarser blocks are steered by the mean of the finest in them.
-    planes = jnp.concatenate([says.alike, says.wider[None]])
+    planes = jnp.concatenate([says.alike, says.wider])
     said = list[widths.Said]()
     for _ in range(adaptive.LEVELS):
         said.append(widths.Said(planes[:-1], jnp.exp(planes[-1])))
@@ -136,20 +152,20 @@ def finish(says: Heard, frame: Prepared, shift: jax.Array) -> jax.Array:
         shift,
         features.CHANNELS,
         adaptive.LEVELS,
-        frame.mean,
+        steered.mean,
         ADAPTIVE_DEFAULT.numbers(),
         said,
     )
-    merged = widths.merged_models(*levels) * frame.factor
+    merged = widths.merged_models(*levels) * steered.factor
     gain = jnp.exp(says.gain)
-    light = (merged[:1] + frame.dark) * gain - frame.dark
+    light = (merged[:1] + steered.dark) * gain - steered.dark
     return jnp.concatenate([light, merged[1:] * gain])
 
 
 def evaluate(says: Heard, frame: Prepared, shift: jax.Array, guides: Guides) -> jax.Array:
     """The denoised light `(H, W, C)` of a frame from `prepare`, as the network says."""
-    means = mean_guides(frame.moments, shift.size)
-    coefficients = with_own_light(finish(says, frame, shift), means)
+    means = mean_guides(frame.steered.moments, shift.size)
+    coefficients = with_own_light(finish(says, frame.steered, shift), means)
     floor = ADAPTIVE_DEFAULT.numbers().floor
     return apply(coefficients, guides, shift, BLOCK, floor) * frame.unit
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -80,7 +81,7 @@ def train(
     if not crops:
         raise ValueError("crops is empty: no frame shows enough surface and light")
     params = initial or regression.init(jax.random.key(settings.seed), settings.widths)
-    solver = Adam(_batch_loss(settings), rate_of(settings))
+    solver, update = _solver(settings)
     state = solver.init_state(params)
     score = Validation(validation)
     history = [Progress(0, float("nan"), score(params))]
@@ -90,7 +91,6 @@ def train(
         (params, state, best), saved = load_state(state_file, (params, state, best), run)
         history = [Progress(*entry) for entry in saved]
         top = max(history, key=lambda entry: (np.nan_to_num(entry.validation), entry.step))
-    update = jax.jit(solver.update)
     step, losses = int(state.iter_num), list[float]()
     with Batches(crops, settings) as batches:
         while not stop(step):
@@ -108,6 +108,13 @@ def train(
                     save_state(state_file, (params, state, best), history, run)
                 report(progress)
     return Result(jax.tree.map(np.asarray, best), top, history)
+
+
+@functools.cache
+def _solver(settings: Settings) -> tuple[Adam, Callable[..., Any]]:
+    """The solver and its step, compiled once for all runs with the same settings."""
+    solver = Adam(_batch_loss(settings), rate_of(settings))
+    return solver, jax.jit(solver.update)
 
 
 def rate_of(settings: Settings) -> Callable[[jax.Array], jax.Array]:

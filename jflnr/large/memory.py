@@ -15,7 +15,7 @@ SHARE = 0.5
 # is denoised whole, of a frame that waits in pieces, and of a piece with what it overlaps.
 BASE = 450 * 2**20
 WHOLE = 320
-REST = {"flr": 1, "flr-adaptive": 1, "flnr": 14}
+REST = {"flr": 1, "flr-adaptive": 1, "flnr": 17}
 PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 230}
 # Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` and `flnr` do.
 STRIP_OVERLAP = 200

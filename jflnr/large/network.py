@@ -1,7 +1,8 @@
 """FLNR piece by piece: the passes of adaptive FLR, and the network on tiles of blocks.
 
-What the network reads of the whole frame are two means of what the regressions find. So tiles are
-fitted twice: adaptive FLR's models give those means, and the second time the network uses them.
+What the network reads of the whole frame are two means of what the regressions find. So adaptive
+FLR's models come first, of all tiles, and give those means. Then the tiles are fitted once more and
+the network says what it makes of them, and a third time, as it says.
 """
 
 from __future__ import annotations
@@ -52,17 +53,21 @@ def correct(
     how much brightness is given back.
     """
     scales = sum(name.startswith("encode") and name[-1].isdigit() for name in params)
-    # Six blocks of the coarsest scale, each twice the finest, are more than all convolutions reach;
-    # before them and after them all levels are fitted.
-    reach = 2 * REACH + 6 * 2**scales
     known = Known(mean, bool(output.any()), rate, _means(job, moments, models, mean))
-    for across, along in job.tiles(job.block, reach, max(ALIGN, 2**scales)):
-        y, x = across.on(2), along.on(2)
-        given = jnp.asarray(output[y.outer, x.outer])
-        tile = moments[across.outer, along.outer]
-        found = np.asarray(_models(tile, given, known, job.common, params, job.block))
-        found = found.reshape(-1, *found.shape[2:])
-        models[across.inner, along.inner] = found[:, across.kept, along.kept]
+    with job.planes(regression.PLANES, job.block) as says:
+        # Six blocks of the coarsest scale, each twice the finest, are more than all convolutions
+        # reach.
+        for across, along in job.tiles(job.block, REACH + 6 * 2**scales, max(ALIGN, 2**scales)):
+            tile = moments[across.outer, along.outer]
+            found = np.asarray(_said(tile, known, job.common, params, job.block))
+            says[across.inner, along.inner] = found[:, across.kept, along.kept]
+        for across, along in job.tiles(job.block, REACH, ALIGN):
+            y, x = across.on(2), along.on(2)
+            given = jnp.asarray(output[y.outer, x.outer])
+            tile, said = (planes[across.outer, along.outer] for planes in (moments, says))
+            found = np.asarray(_models(tile, said, given, known, job.common, job.block))
+            found = found.reshape(-1, *found.shape[2:])
+            models[across.inner, along.inner] = found[:, across.kept, along.kept]
 
 
 def _means(job: Job, moments: Planes, models: Planes, mean: jax.Array) -> jax.Array:
@@ -78,23 +83,34 @@ def _means(job: Job, moments: Planes, models: Planes, mean: jax.Array) -> jax.Ar
 
 
 @functools.partial(jax.jit, static_argnames="block")
+def _said(
+    moments: jax.Array, known: Known, common: Common, params: unet.Params, block: int
+) -> jax.Array:
+    """What the network says of the blocks of a tile, `(regression.PLANES, h, w)`."""
+    grid = Grid(moments[:-1], moments[-1:], block)
+    _, steps = widths.fit_levels(
+        grid, common.shift, features.CHANNELS, adaptive.LEVELS, known.mean, common.numbers
+    )
+    x = features.of_steps(steps, common.shift.size, known.mean, tuple(known.means))
+    height, width = moments.shape[1:]
+    return jnp.concatenate(regression.heard(params, x, (height, width)))
+
+
+@functools.partial(jax.jit, static_argnames="block")
 def _models(
     moments: jax.Array,
+    said: jax.Array,
     output: jax.Array,
     known: Known,
     common: Common,
-    params: unet.Params,
     block: int,
 ) -> jax.Array:
-    """The network's models of the blocks of a tile, `(Q + 2, C, h, w)`."""
+    """The models of the blocks of a tile as the network says, `(Q + 2, C, h, w)`."""
     grid = Grid(moments[:-1], moments[-1:], block)
-    guides, channels = common.shift.size, features.CHANNELS
-    numbers = common.numbers
-    _, steps = widths.fit_levels(grid, common.shift, channels, adaptive.LEVELS, known.mean, numbers)
     factor = energy.scale(jnp.ones((1, 1, *moments.shape[1:])), output, known.rate)[0, 0]
-    x = features.of_steps(steps, guides, known.mean, tuple(known.means))
     # Without light there is none for the gain to act on, either.
     dark = jnp.where(known.lit, features.DARK * known.mean, 0)
-    frame = regression.Prepared(x, grid.moments, grid.noise, factor, known.mean, dark, 1.0)
-    models = regression.finish(regression.heard(params, frame), frame, common.shift)
-    return with_own_light(models, mean_guides(grid.moments, guides))
+    says = regression.Heard(*jnp.split(said, regression.ENDS))
+    steered = regression.Steered(grid.moments, grid.noise, factor, known.mean, dark)
+    models = regression.finish(says, steered, common.shift)
+    return with_own_light(models, mean_guides(grid.moments, common.shift.size))

@@ -70,8 +70,8 @@ def outspoken(widths: tuple[int, ...]) -> unet.Params:
 def by_jax() -> Callable[..., Any]:
     def whole(target: Any, guides: Any, weight: Any, params: Any) -> Any:
         known, shift = regression.prepare(target, guides, weight)
-        says = regression.heard(params, known)
-        model = known.unit * regression.finish(says, known, shift)
+        says = regression.heard(params, known.x, known.size)
+        model = known.unit * regression.finish(says, known.steered, shift)
         return known.x, model, regression.evaluate(says, known, shift, guides)
 
     return jax.jit(whole, compiler_options=QUICK)
@@ -211,6 +211,6 @@ def test_command_line(
     command += ["--backend", "opencl", "--method", "flnr-tiny"]
     assert main([*command, "--profile"]) == 0
     printed = capsys.readouterr().out
-    assert all(kernel in printed for kernel in ("convolve", "finest", "finish", "weighted_moments"))
+    assert all(kernel in printed for kernel in ("convolve", "finest", "steer", "weighted_moments"))
     assert main([*command, "--overwrite", "--block", "16"]) == 2
     assert "block 8 only; got 16" in capsys.readouterr().err
