@@ -75,7 +75,6 @@ def test_models_by_the_weights(params, example):
     check(models, params, known.steered.moments)
 
 
-@pytest.mark.slow
 def test_what_training_minimises(params, example):
     # By the weights: pixels of the frame are taken in float32.
     check(lambda p: loss.to_reference(p, example), params)
