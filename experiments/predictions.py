@@ -43,7 +43,7 @@ def one(key: str) -> dict[str, Any]:
     path, spp = key.rsplit(":", 1)
     frame = jflnr.read_frame(path, spp=int(spp))
     row: dict[str, Any] = {"frame": data.label(Path(path)), "spp": int(spp)}
-    row |= {"simple": is_simple(frame), "looks": {}, "psnr": {}}
+    row |= {"simple": bool(is_simple(frame)), "looks": {}, "psnr": {}}
     for form in plans.BLOCKS:
         image, models = denoise_on_blocks(frame, form)
         row["psnr"][form] = quality(frame, image)

@@ -16,6 +16,9 @@ from jflnr.frame import Frame, write_frame
 def pytest_configure(config: pytest.Config) -> None:
     # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
     config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
+    # Tests wait for the compiler, not for what it makes; so do the processes that they start.
+    flags = os.environ.get("XLA_FLAGS", "")
+    os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_optimization_level=0"
     # Many tests need the same programs, and those of FLNR take a minute to compile. Processes that
     # tests start find the folder in their environment.
     if "JAX_COMPILATION_CACHE_DIR" not in os.environ:

@@ -60,15 +60,21 @@ def check(
         )
 
 
-@jax.jit
 def prepared(frame: Frame) -> tuple[regression.Prepared, jax.Array, Guides]:
-    """What precedes the network, the shift of the guides and the guides themselves.
+    """What precedes the network, the shift of the guides and the guides themselves."""
+    known, shift, made = _prepared(frame)
+    return known, shift, (frame.normal, *made)
+
+
+@jax.jit
+def _prepared(frame: Frame) -> tuple[regression.Prepared, jax.Array, Guides]:
+    """`prepared`, with the guides but the normal, which would be copied on its way out.
 
     A program of its own, as is what follows the network: networks of all sizes share both.
     """
     images = adaptive_images(frame, features.GUIDES)
-    guides = images["guides"]
-    return *regression.prepare(images["target"], guides, images["weight"]), guides
+    known, shift = regression.prepare(images["target"], images["guides"], images["weight"])
+    return known, shift, images["guides"][1:]
 
 
 @jax.jit

@@ -12,7 +12,7 @@ from jflnr.flr.moments import Guides, from_shift, planes
 from jflnr.flr.strips import cut, fill, step_of
 
 # Rows of pixels that are worked on at a time: so many that the compiler divides the last step among
-# the cores. A floor needs more of the cache.
+# the cores.
 ROWS = 64
 
 
@@ -63,7 +63,7 @@ def apply_rows(
         return apply_strip(cut(guides, first, rows), models, shift, block, floor)
 
     image = jnp.zeros((height, width, coefficients.shape[1]), coefficients.dtype)
-    return fill(image, 0, height, 1, step_of(block, ROWS if floor is None else ROWS // 2), strip)
+    return fill(image, 0, height, 1, step_of(block, ROWS), strip)
 
 
 def apply_strip(
@@ -111,7 +111,7 @@ def apply_strip(
     if floor is not None:
         own = pixels(start[-1, ..., None] + t * difference[-1, ..., None])
         channels = lift(channels, own, floor)
-    return jnp.stack(list(channels), axis=-1)
+    return jnp.moveaxis(channels, 0, -1)
 
 
 def _hat(block: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

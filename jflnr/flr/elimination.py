@@ -19,7 +19,7 @@ from jflnr.flr.moments import index_xx, index_xy
 # Roundings of a sum of squares that may add up.
 ROUNDING = 64
 # Blocks that are solved at a time.
-STRIP = 1024
+STRIP = 4096
 
 
 def solve_strips(

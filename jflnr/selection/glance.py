@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
+import jax
+import jax.numpy as jnp
 
 from jflnr.frame import Frame
 
@@ -18,31 +19,36 @@ TURN, GAP = 0.3, 0.1
 EDGES, SPREAD = 0.12, 4.0
 
 
-def is_simple(frame: Frame) -> bool:
+@jax.jit
+def is_simple(frame: Frame) -> jax.Array:
     """Whether large blocks will do: few edges, and no light so noisy that it hides the rest."""
-    light = np.asarray(frame.indirect[STEP // 2 :: STEP, STEP // 2 :: STEP], np.float64).mean(-1)
-    light = light[np.isfinite(light)]
-    calm = light.size == 0 or light.std() <= SPREAD * light.mean()
-    return bool(calm and edges(frame) <= EDGES)
-
-
-def edges(frame: Frame) -> float:
-    """Share of the neighbours on the grid between which one surface ends and another begins."""
-    normal, depth = (
-        np.asarray(layer[STEP // 2 :: STEP, STEP // 2 :: STEP], np.float32)
-        for layer in (frame.normal, frame.depth)
+    grid = slice(STEP // 2, None, STEP)
+    light, normal, depth = (
+        jnp.asarray(layer[grid, grid], jnp.float32)
+        for layer in (frame.indirect, frame.normal, frame.depth)
     )
-    with np.errstate(invalid="ignore", over="ignore"):  # pixels that are not finite are edges
-        found = [_ends(normal, depth, axis) for axis in (0, 1)]
-    count = sum(part.size for part in found)
-    return float(sum(part.sum() for part in found)) / max(count, 1)
+    return _is_calm(jnp.mean(light, axis=-1)) & (_edges(normal, depth[..., 0]) <= EDGES)
 
 
-def _ends(normal: np.ndarray, depth: np.ndarray, axis: int) -> np.ndarray:
-    """Where neighbours along an axis differ, one fewer along it."""
-    first = [slice(None)] * 2
-    last = [slice(None)] * 2
-    first[axis], last[axis] = slice(None, -1), slice(1, None)
-    here, there = depth[tuple(first)][..., 0], depth[tuple(last)][..., 0]
-    turn = np.linalg.norm(normal[tuple(last)] - normal[tuple(first)], axis=-1)
-    return ~(turn <= TURN) | ~(np.abs(there - here) <= GAP * np.minimum(here, there))
+def _is_calm(light: jax.Array) -> jax.Array:
+    known = jnp.isfinite(light)
+    light = jnp.where(known, light, 0)
+    light /= jnp.maximum(jnp.max(light, initial=0), 1e-30)  # squares of the brightest may overflow
+    count = jnp.maximum(jnp.sum(known), 1)
+    mean = jnp.sum(light) / count
+    return jnp.sum(jnp.where(known, light - mean, 0) ** 2) <= count * (SPREAD * mean) ** 2
+
+
+def _edges(normal: jax.Array, depth: jax.Array) -> jax.Array:
+    """Share of neighbours on the grid between which one surface ends and another begins."""
+    found = jnp.concatenate([_ends(normal, depth, axis).ravel() for axis in (0, 1)])
+    return jnp.sum(found) / max(found.size, 1)
+
+
+def _ends(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
+    """Where neighbours along an axis differ, one fewer along it; pixels that are not finite do."""
+    if axis == 1:
+        normal, depth = normal.swapaxes(0, 1), depth.T
+    turn = jnp.sum((normal[1:] - normal[:-1]) ** 2, axis=-1)
+    here, there = depth[:-1], depth[1:]
+    return ~(turn <= TURN**2) | ~(jnp.abs(there - here) <= GAP * jnp.minimum(here, there))

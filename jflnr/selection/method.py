@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jflnr import guides as guide_layers
 from jflnr.flnr.features import GUIDES
 from jflnr.flr.adaptive import light_of
 from jflnr.flr.apply import apply
 from jflnr.flr.energy import rescale
 from jflnr.flr.floor import with_own_light
+from jflnr.flr.noisy_guides import smooth_guide
 from jflnr.frame import Array, Frame
 from jflnr.inputs import adaptive_images, flr_images, prepare
 from jflnr.selection import plan as plans
@@ -90,9 +92,12 @@ def denoise_on_blocks(
 
 @dataclasses.dataclass(frozen=True)
 class Fitted:
-    """A frame as the regressions take it, its moments on blocks of so many pixels, and models."""
+    """A frame on the device, its ambient occlusion without noise if models follow that closely,
+    its moments on blocks of so many pixels, and models."""
 
-    images: dict[str, Any]
+    frame: Frame
+    names: tuple[str, ...]
+    scene: guide_layers.Scene
     collected: Collected
     models: Models
     unfinished: Unfinished
@@ -106,8 +111,9 @@ def _planned(
     """The plan, and the models of the form that it rests on."""
     if frame.indirect.shape[:2] != frame.normal.shape[:2]:
         raise ValueError("method auto needs frame.indirect at the size of the guides")
+    frame = jax.tree.map(jnp.asarray, frame)
     pixels = frame.depth.size
-    first = plans.first(is_simple(frame), limits, pixels)
+    first = plans.first(bool(is_simple(frame)), limits, pixels)
     fitted = _fitted(frame, names, first)
     look = plans.look_at(fitted.models)
     network = sorted(names) == sorted(GUIDES) and frame.indirect.shape[-1] == 3
@@ -118,10 +124,12 @@ def _planned(
 def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
     """The models of the form that `form` begins with."""
     block = plans.COLLECTED[form]
-    images, collected = _collect(frame, names, block)
-    groups = tuple(layer.shape[-1] for layer in images["guides"] if layer.shape[-1])
+    frame = jax.tree.map(jnp.asarray, frame)
+    scene, ao, collected = _collect(frame, names, block)
+    frame = dataclasses.replace(frame, ao=frame.ao if ao is None else ao)
+    groups = tuple(getattr(frame, name).shape[-1] for name in names)
     models, unfinished = fit(collected, groups, block)
-    return Fitted(images, collected, models, unfinished, groups, block)
+    return Fitted(frame, names, scene, collected, models, unfinished, groups, block)
 
 
 def _finished(fitted: Fitted, form: str) -> Models:
@@ -134,35 +142,69 @@ def _finished(fitted: Fitted, form: str) -> Models:
 def _image(
     fitted: Fitted, models: Models, form: str, used: tuple[int, ...], keep_energy: bool
 ) -> Array:
-    shift, unit = fitted.collected.shift, fitted.collected.unit
-    return _apply(fitted.images, models, shift, unit, used, plans.COLLECTED[form], keep_energy)
+    collected, block = fitted.collected, plans.COLLECTED[form]
+    light = collected.shift, collected.unit
+    return _apply(
+        fitted.frame, fitted.scene, models, *light, fitted.names, used, block, keep_energy
+    )
 
 
 @functools.partial(jax.jit, static_argnames=("names", "block"))
-def _collect(frame: Frame, names: tuple[str, ...], block: int) -> tuple[dict[str, Any], Collected]:
-    # Models of large blocks hardly follow ambient occlusion, let alone its noise.
-    images = (adaptive_images if block < 8 else flr_images)(frame, names)
+def _collect(
+    frame: Frame, names: tuple[str, ...], block: int
+) -> tuple[guide_layers.Scene, jax.Array | None, Collected]:
+    """The scene, its smoothed ambient occlusion if that is used, and the moments.
+
+    No layer of the frame itself: a program that returned one would copy it.
+    """
+    scene = guide_layers.scene_of(frame)
+    images = _images(frame, names, block, scene)
     collected = collect_frame(images["target"], images["guides"], block, images["weight"])
-    return images, collected
+    smoothed = "ao" in names and _is_fine(block)
+    return scene, images["guides"][names.index("ao")] if smoothed else None, collected
 
 
-@functools.partial(jax.jit, static_argnames=("used", "block", "keep_energy"))
+def _images(
+    frame: Frame,
+    names: tuple[str, ...],
+    block: int,
+    scene: guide_layers.Scene,
+    smooth: Callable[..., Array] = smooth_guide,
+) -> dict[str, Any]:
+    if _is_fine(block):
+        return adaptive_images(frame, names, scene, smooth)
+    return flr_images(frame, names, scene)
+
+
+def _is_fine(block: int) -> bool:
+    """Whether blocks are so small that models follow the noise of ambient occlusion, and need a
+    floor. Scenes that large ones are enough for have few gaps and corners to be too dark in."""
+    return block < 8
+
+
+@functools.partial(jax.jit, static_argnames=("names", "used", "block", "keep_energy"))
 def _apply(
-    images: dict[str, Any],
+    frame: Frame,
+    scene: guide_layers.Scene,
     models: Models,
     shift: jax.Array,
     unit: jax.Array,
+    names: tuple[str, ...],
     used: tuple[int, ...],
     block: int,
     keep_energy: bool,
 ) -> jax.Array:
     """Evaluate the models at every pixel, reading the guides `used` only."""
+    images = _images(frame, names, block, scene, lambda ao, *_: ao)
     target, layers = images["target"], images["guides"]
     ends = np.cumsum([layer.shape[-1] for layer in layers])
     kept = [int(q) for n in used for q in range(ends[n] - layers[n].shape[-1], ends[n])]
     held = hold(models.coefficients, models.means, kept)
-    held = with_own_light(held, models.means[np.array([0, *(q + 1 for q in kept)])])
-    none = jnp.zeros((*target.shape[:2], 0), held.dtype)
-    guides = (*(layers[n] for n in used), none)
-    image = apply(held, guides, shift[np.array(kept, int)], block, SETTINGS.numbers().floor) * unit
+    guides = (*(layers[n] for n in used), jnp.zeros((*target.shape[:2], 0), held.dtype))
+    shift = shift[np.array(kept, int)]
+    if _is_fine(block):
+        held = with_own_light(held, models.means[np.array([0, *(q + 1 for q in kept)])])
+        image = apply(held, guides, shift, block, SETTINGS.numbers().floor) * unit
+    else:
+        image = apply(held * unit, guides, shift, block)
     return rescale(image, light_of(target), images["weight"]) if keep_energy else image

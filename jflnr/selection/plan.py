@@ -25,10 +25,10 @@ COLLECTED = {"blocks-16": 8, "blocks-8": 4, "blocks-4": 4}
 BLOCKS = tuple(COLLECTED)
 FORMS = (*BLOCKS, "flnr")
 # Time per pixel, in that of plain FLR with five guides (the experiment `parsimony`).
-COSTS = dict(zip(FORMS, (1.6, 2.9, 4.3, 4.6), strict=True))
+COSTS = dict(zip(FORMS, (1.4, 3.5, 5.0, 6.9), strict=True))
 # What looking at a frame by a form has cost when a larger one is taken after all that does not
 # go on from it.
-LOOKS = {"blocks-16": 1.1, "blocks-8": 2.4}
+LOOKS = {"blocks-16": 0.9, "blocks-8": 2.4}
 # Decibels that a form must bring for each further FLR of time.
 PRICE = 0.08
 # A guide is read at every pixel if inside blocks it does more than this share of the squared error.

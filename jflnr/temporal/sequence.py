@@ -83,8 +83,20 @@ def step(
     names, inputs = prepared(state, frame, method, guides)
     parameters = parameters_of(method, parameters)
     support = support_of(parameters, max(frame.normal.shape)) if method == "flr" else 0
-    surface, temporal = Surface.of(frame), temporal or Temporal()
-    return _step(state, inputs, frame.motion, surface, parameters, temporal, method, names, support)
+    surface = jax.tree.map(jnp.asarray, Surface.of(frame))
+    light, image, evidence = _step(
+        state,
+        inputs,
+        frame.motion,
+        surface,
+        parameters,
+        temporal or Temporal(),
+        method,
+        names,
+        support,
+    )
+    # The surface and the image twice would be copied if the program returned them.
+    return State(surface, light, image, evidence), image.mean
 
 
 def prepared(
@@ -135,7 +147,7 @@ def _step(
     method: str,
     names: tuple[str, ...],
     support: int,
-) -> tuple[State, jax.Array]:
+) -> tuple[Average, Average, Evidence]:
     images = adaptive_images(frame, names)
     guides, mask = images["guides"], images["weight"]
     taps = find_taps(motion, surface, state.surface)
@@ -154,7 +166,7 @@ def _step(
     weight = light.samples[..., 0] if mask is None else jnp.where(mask, light.samples[..., 0], 0)
     fitted = _fit(light.mean, guides, weight, parameters, method, support)
     image = accumulate(_changed(image, change), fitted, temporal.image)
-    return State(surface, light, image, evidence), image.mean
+    return light, image, evidence
 
 
 def _changed(average: Average, change: Change) -> Average:

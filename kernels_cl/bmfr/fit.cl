@@ -81,10 +81,8 @@ INLINE void find_ranges(
     Ranges *ranges)
 {
     float ends[2 * Q];
-#pragma unroll
     for (int i = 0; i < 2 * count; ++i) ends[i] = lane_max(reach[i]);
     combine(ends, 2 * count, 0, worker, partial);
-#pragma unroll
     for (int i = 0; i < count; ++i) {
         const float low = -ends[2 * i], high = ends[2 * i + 1];
         ranges->low[first + i] = low;

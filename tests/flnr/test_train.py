@@ -130,10 +130,10 @@ print(len(jax.local_devices()), result.history[-1].loss)
 def test_two_devices_find_the_same_loss(frames, crops, settings):
     one = train.train(crops, [], settings, stop=lambda step: step >= 1)
     code = TWO_DEVICES.format(root=os.getcwd(), folder=str(frames))
-    flags = {"XLA_FLAGS": "--xla_force_host_platform_device_count=2", "JAX_PLATFORMS": "cpu"}
+    flags = os.environ["XLA_FLAGS"] + " --xla_force_host_platform_device_count=2"
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
-        env=os.environ | flags,
+        env=os.environ | {"XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu"},
         capture_output=True,
         text=True,
     )

@@ -1,14 +1,9 @@
 """One check of any function's derivatives, along a random direction."""
 
-import functools
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
-
-# Optimising would take longer than running: every function is run five times.
-compiled = functools.partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 
 
 def agree(function, *point, step=1e-4, forward_tolerance=1e-7, reverse_tolerance=1e-9, seed=0):
@@ -27,7 +22,7 @@ def agree(function, *point, step=1e-4, forward_tolerance=1e-7, reverse_tolerance
 
         back = rng.standard_normal(jax.eval_shape(flat, point).shape)
 
-        @compiled
+        @jax.jit
         def both(point):
             value, forward = jax.jvp(flat, (point,), (direction,))
             gradient = jax.vjp(flat, point)[1](jnp.asarray(back))[0]

@@ -1,7 +1,5 @@
 """Derivatives of FLR against other code and other methods than finite differences of itself."""
 
-import functools
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -52,8 +50,6 @@ PROBLEMS = st.fixed_dictionaries(
         "seed": st.integers(0, 2**32 - 1),
     }
 )
-# Optimising would take longer than running: every problem has a program of its own.
-compiled = functools.partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 
 
 def derivatives_agree(problem):
@@ -69,12 +65,12 @@ def derivatives_agree(problem):
         def whole(arrays):
             return flr(*arrays, block=block, support=8)
 
-        @compiled
+        @jax.jit
         def both(point, direction, back):
             _, forward = jax.jvp(whole, (point,), (direction,))
             return forward, jax.vjp(whole, point)[1](back)[0]
 
-        evaluate = compiled(whole)
+        evaluate = jax.jit(whole)
 
         counts = problem["channels"], problem["guides"]
         point = (*(normal(n) for n in counts), jax.tree.map(jnp.float64, parameters))

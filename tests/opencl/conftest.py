@@ -11,8 +11,6 @@ import pytest
 from jflnr.flr.parameters import Parameters
 from jflnr.opencl import Context, NoDevice
 
-# Little optimisation takes a third of the time to compile, and changes no digit that matters here.
-QUICK = {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
 PARAMETERS = Parameters.of(sigma=12.0, eps=1e-3, eps_prime=1e-4)
 
 
@@ -49,7 +47,7 @@ def scene(
 
 def in_float64(function: Callable[..., Any], **static: Any) -> Callable[..., np.ndarray]:
     """The JAX function, compiled once, of numpy arrays (and tuples of them) in float64."""
-    program = jax.jit(functools.partial(function, **static), compiler_options=QUICK)
+    program = jax.jit(functools.partial(function, **static))
 
     def widen(values: Any) -> Any:
         floating = isinstance(values, np.ndarray) and values.dtype != bool

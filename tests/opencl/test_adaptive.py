@@ -13,7 +13,7 @@ from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.noisy_guides import smooth_guide as jax_smooth
 from jflnr.opencl import Context, flr_adaptive, smooth_guide
 from tests.opencl import tolerances
-from tests.opencl.conftest import QUICK, error, scene
+from tests.opencl.conftest import error, scene
 
 SIZE = (61, 203)
 PARAMETERS = ADAPTIVE_DEFAULT.but(exponent=0.8)
@@ -24,7 +24,7 @@ MOST = 8
 @functools.cache
 def by_jax(**options: Any) -> Callable[..., np.ndarray]:
     program = functools.partial(jax_adaptive, parameters=PARAMETERS, **options)
-    compiled = jax.jit(program, compiler_options=QUICK)
+    compiled = jax.jit(program)
     return lambda *arrays, **named: np.asarray(compiled(*arrays, **named))
 
 

@@ -14,10 +14,10 @@ from jflnr.opencl import bmfr as kernels
 from jflnr.opencl.profile import profile
 from jflnr.temporal import bmfr
 from tests.opencl import tolerances
-from tests.opencl.conftest import QUICK, error
+from tests.opencl.conftest import error
 from tests.temporal.bmfr_shot import shot
 
-step = jax.jit(bmfr.step, static_argnames="parameters", compiler_options=QUICK)
+step = jax.jit(bmfr.step, static_argnames="parameters")
 # In the first frame `fitted` is phase II alone.
 PHASES = {"light": "I", "samples": "I", "fitted": "II and III", "picture": "III"}
 

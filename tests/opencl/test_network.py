@@ -18,7 +18,7 @@ from jflnr.opencl import Context, flnr, network, network_unet
 from jflnr.opencl.arguments import to_image, to_layers, to_weight
 from jflnr.opencl.network_unet import MARGIN, Maps
 from tests.opencl import tolerances
-from tests.opencl.conftest import QUICK, error, in_float64, scene
+from tests.opencl.conftest import error, in_float64, scene
 
 # 15 x 51 of the finest blocks: the network's own, of two by two, go beyond them on both sides.
 SIZE = (57, 203)
@@ -74,7 +74,7 @@ def by_jax() -> Callable[..., Any]:
         model = known.unit * regression.finish(says, known.steered, shift)
         return known.x, model, regression.evaluate(says, known, shift, guides)
 
-    return jax.jit(whole, compiler_options=QUICK)
+    return jax.jit(whole)
 
 
 @pytest.mark.parametrize("device", ["context", "gpu_like"])

@@ -17,11 +17,11 @@ from jflnr.opencl import temporal as kernels
 from jflnr.temporal.change import BLOCK
 from jflnr.temporal.sequence import parameters_of
 from tests.opencl import tolerances
-from tests.opencl.conftest import QUICK, error
+from tests.opencl.conftest import error
 from tests.temporal.bmfr_shot import shot
 
 GUIDES = ("normal", "depth")
-step = jax.jit(temporal.step, static_argnames=("method", "guides"), compiler_options=QUICK)
+step = jax.jit(temporal.step, static_argnames=("method", "guides"))
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,6 @@ from jflnr.flr.adaptive import flr_adaptive
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
-from tests.gradients.directions import compiled
 
 FIVE_GUIDES = [case for case in CASES if "16" not in case]
 
@@ -29,7 +28,7 @@ def gradient(method):
         ramp = jnp.linspace(-1, 1, light.size).reshape(light.shape)
         return jnp.mean(light * ramp)
 
-    return compiled(jax.grad(mean, argnums=(0, 1, 2)))
+    return jax.jit(jax.grad(mean, argnums=(0, 1, 2)))
 
 
 def is_finite(method, case, parameters, channels):

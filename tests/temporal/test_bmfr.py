@@ -10,11 +10,10 @@ import pytest
 import jflnr
 from jflnr import denoising
 from jflnr.temporal import bmfr, bmfr_taa
-from tests.opencl.conftest import QUICK
 from tests.temporal.bmfr_shot import STEP, shot
 
 SIZE = (40, 56)
-step = jax.jit(bmfr.step, static_argnames="parameters", compiler_options=QUICK)
+step = jax.jit(bmfr.step, static_argnames="parameters")
 
 
 def changed(frame, **layers):
@@ -45,7 +44,7 @@ def result(frames):
 
 
 def test_scan_equals_loop(frames, result):
-    scan = jax.jit(lambda *a: jax.lax.scan(bmfr.step, *a), compiler_options=QUICK)
+    scan = jax.jit(lambda *a: jax.lax.scan(bmfr.step, *a))
     stacked = jax.tree.map(lambda *layers: jnp.stack(layers), *frames)
     history, images = scan(bmfr.start(frames[0]), stacked)
     np.testing.assert_allclose(images, result[1], rtol=1e-4, atol=1e-5)
