@@ -35,10 +35,8 @@ def run(quick: bool) -> dict[str, Any]:
     """Milliseconds a frame, the best of several; every method in turn."""
     size = (90, 160) if quick else (HEIGHT, WIDTH)
     before, now = (enlarge(frame, *size) for frame in made_up(2).frames)
-    # Each back end in turns of its own: in turns with JAX's, kernels took many times as long.
-    seconds: dict[str, float] = {}
-    for group in (by_kernels(before, now), by_jax(before, now)):
-        seconds |= interleaved(group, 2 if quick else 15)
+    calls = by_kernels(before, now) | by_jax(before, now)
+    seconds = interleaved(calls, 2 if quick else 15)
     rows = [
         {
             "method": name,

@@ -15,6 +15,7 @@ import numpy as np
 import jflnr
 from experiments import data, plots, results
 from jflnr import opencl
+from jflnr.flnr import weights
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.parameters import DEFAULT
 from jflnr.flr.regression import flr
@@ -32,10 +33,11 @@ OIDN: dict[str, dict[str, Any]] = {
     "OIDN high": {"quality": "high", "clean": False},
     "OIDN high, clean auxiliaries": {"quality": "high", "clean": True},
 }
-# Methods that have OpenCL kernels, and their constants.
+# Methods whose kernels are timed by themselves too, and their constants.
 OPENCL: dict[str, tuple[Callable[..., Any], Any]] = {
     "flr": (opencl.flr, DEFAULT),
     "flr-adaptive": (opencl.flr_adaptive, ADAPTIVE_DEFAULT),
+    "flnr": (opencl.flnr, weights.shipped("flnr")),
 }
 
 
@@ -78,9 +80,10 @@ def methods_on(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
     for method in jflnr.METHODS:
         denoise = functools.partial(jflnr.denoise, on_device, method)
         calls[f"denoise {method}, JAX"] = functools.partial(finished, denoise)
-    for method in OPENCL:
+    for method in (m for m in jflnr.METHODS if m != "auto"):  # which has no kernels
         denoise = functools.partial(jflnr.denoise, frame, method, backend="opencl")
-        calls[f"denoise {method}, OpenCL"] = denoise
+        calls[f"denoise {method}, OpenCL"] = functools.partial(finished, denoise)
+    for method in OPENCL:
         calls[f"{method}, OpenCL"] = opencl_call(frame, method)
     return calls | oidn_calls(frame)
 

@@ -43,6 +43,7 @@ class Context:
         self.pool = cl.tools.MemoryPool(cl.tools.ImmediateAllocator(self.queue))
         self.work_group = work_group or (32 if self.on_cpu else 64)
         self.launches: list[Launch] | None = None
+        self._programs: dict[tuple[Any, ...], Any] = {}
         self._kernels: dict[tuple[Any, ...], Any] = {}
         self._in_use: list[np.ndarray] = []
 
@@ -78,7 +79,7 @@ class Context:
         group = group or (1 if alone and self.on_cpu else self.work_group)
         local = (group, *(1 for _ in size[1:]))
         padded = tuple(math.ceil(n / m) * m for n, m in zip(size, local, strict=True))
-        event = self._kernel(name, file, defines)(
+        event = self._kernel(name, file, defines, arguments)(
             self.queue, padded, local, *map(_argument, arguments)
         )
         if self.launches is not None:
@@ -121,13 +122,19 @@ class Context:
             mapped.base.release(self.queue)
         return result
 
-    def _kernel(self, name: str, file: str, defines: dict[str, int]) -> Any:
-        key = (name, file, *sorted(defines.items()))
-        if key not in self._kernels:
+    def _kernel(
+        self, name: str, file: str, defines: dict[str, int], arguments: Sequence[Any]
+    ) -> Any:
+        program = (file, *sorted(defines.items()))
+        key = (name, *program)
+        if program not in self._programs:
             options = [f"-D{define}={value}" for define, value in defines.items()]
-            program = self.cl.Program(self.context, source(file)).build(options)
-            for kernel in program.all_kernels():
-                self._kernels[(kernel.function_name, *key[1:])] = kernel
+            self._programs[program] = self.cl.Program(self.context, source(file)).build(options)
+        if key not in self._kernels:
+            self._kernels[key] = kernel = self.cl.Kernel(self._programs[program], name)
+            # Told the types of numbers, pyopencl raises no C++ exception to find each of them out:
+            # one takes milliseconds in a process in which JAX has compiled many programs.
+            kernel.set_scalar_arg_dtypes([_type(value) for value in arguments])
         return self._kernels[key]
 
 
@@ -136,12 +143,15 @@ def is_device_array(values: Any) -> bool:
     return hasattr(values, "base_data")
 
 
+def _type(argument: Any) -> Any:
+    """What a kernel gets for a number, int or float; None for an array."""
+    if isinstance(argument, int):
+        return np.int32
+    return np.float32 if isinstance(argument, float) else None
+
+
 def _argument(value: Any) -> Any:
-    if isinstance(value, int):
-        return np.int32(value)
-    if isinstance(value, float):
-        return np.float32(value)
-    return None if value is None else value.data
+    return value if value is None or isinstance(value, int | float) else value.data
 
 
 @functools.cache

@@ -57,6 +57,7 @@ def select_inputs(
     keep_energy: bool = False,
 ) -> tuple[plans.Plan, Array]:
     """`select` of what `prepare` returned."""
+    frame = _on_device(frame)
     plan, fitted = _planned(frame, names, limits)
     if plan.form not in plans.BLOCKS:
         from jflnr.denoising import denoise
@@ -73,7 +74,8 @@ def select_inputs(
 def plan_of(frame: Frame, guides: Sequence[str] | None = None) -> plans.Plan:
     """The plan that method `auto` follows for a frame, with the time predicted of it."""
     names, inputs = prepare(frame, guides)
-    return _planned(inputs, names, plans.Limits(seconds=plans.seconds_per_pixel()))[0]
+    limits = plans.Limits(seconds=plans.seconds_per_pixel())
+    return _planned(_on_device(inputs), names, limits)[0]
 
 
 def denoise_on_blocks(
@@ -84,7 +86,7 @@ def denoise_on_blocks(
     frame, guides: as of `denoise`. The errors of the models are in the unit of the light.
     """
     names, inputs = prepare(frame, guides)
-    fitted = _fitted(inputs, names, form)
+    fitted = _fitted(_on_device(inputs), names, form)
     models = _finished(fitted, form)
     image = _image(fitted, models, form, tuple(range(len(names))), False)
     return image, models._replace(error=models.error * fitted.collected.unit**2)
@@ -105,13 +107,15 @@ class Fitted:
     block: int
 
 
+_on_device = functools.partial(jax.tree.map, jnp.asarray)
+
+
 def _planned(
     frame: Frame, names: tuple[str, ...], limits: plans.Limits
 ) -> tuple[plans.Plan, Fitted]:
     """The plan, and the models of the form that it rests on."""
     if frame.indirect.shape[:2] != frame.normal.shape[:2]:
         raise ValueError("method auto needs frame.indirect at the size of the guides")
-    frame = jax.tree.map(jnp.asarray, frame)
     pixels = frame.depth.size
     first = plans.first(bool(is_simple(frame)), limits, pixels)
     fitted = _fitted(frame, names, first)
@@ -122,9 +126,8 @@ def _planned(
 
 
 def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
-    """The models of the form that `form` begins with."""
+    """The models of the form that `form` begins with; the frame is on the device."""
     block = plans.COLLECTED[form]
-    frame = jax.tree.map(jnp.asarray, frame)
     scene, ao, collected = _collect(frame, names, block)
     frame = dataclasses.replace(frame, ao=frame.ao if ao is None else ao)
     groups = tuple(getattr(frame, name).shape[-1] for name in names)
