@@ -26,6 +26,7 @@ NAMES = (
     "guide_choice",
     "flnr",
     "flnr_spp",
+    "paper_form",
     "optimisers",
     "learning_curve",
     "finetune",

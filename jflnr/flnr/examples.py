@@ -122,8 +122,14 @@ def _wanted(crop: Crop) -> np.ndarray:
 
 
 def draw(crop: Crop, random: np.random.Generator) -> Example:
-    """The crop under a new realisation of the noise, mixed from those that there are; mirrored and
-    recoloured."""
+    """The crop under a new realisation of the noise, with what precedes the network."""
+    frame, exposure = renewed(crop, random)
+    return Example(*prepared(frame), frame.albedo, shown(frame, exposure), exposure)
+
+
+def renewed(crop: Crop, random: np.random.Generator) -> tuple[Frame, np.float32]:
+    """The crop under a new realisation of the noise, mixed from those that there are, mirrored and
+    recoloured, with its target as `reference`; and its exposure."""
     counts = sorted(crop.light)
     shares = np.array([SHARES[spp] for spp in counts])
     layers = crop.light[counts[random.choice(len(counts), p=shares / shares.sum())]]
@@ -132,11 +138,13 @@ def draw(crop: Crop, random: np.random.Generator) -> Example:
         layers = random.permutation(layers)
         layers, target = layers[1:], layers[0].astype(np.float32)
     frame = dataclasses.replace(crop.frame, indirect=mixed(layers, random), reference=target)
-    frame = augment(frame, random)
-    known, shift, guides = prepared(frame)
     exposure = np.float32(MEAN_BRIGHTNESS / np.mean(crop.frame.albedo * _wanted(crop)))
-    target = np.clip(np.asarray(frame.albedo) * frame.reference * exposure, 0, 1e4)
-    return Example(known, shift, guides, frame.albedo, target, exposure)
+    return augment(frame, random), exposure
+
+
+def shown(frame: Frame, exposure: np.float32) -> np.ndarray:
+    """The reflected light that is wanted of a frame, as exposed, `(H, W, 3)`."""
+    return np.clip(np.asarray(frame.albedo) * frame.reference * exposure, 0, 1e4)
 
 
 def mixed(images: np.ndarray, random: np.random.Generator) -> np.ndarray:
