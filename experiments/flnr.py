@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from experiments.methods import Method, basic, oidn_peers, ours
 from experiments.table1 import PICTURE, mean_of, per_frame
 from experiments.timing import times
 from jflnr import denoise
-from jflnr.frame import Frame
+from jflnr.frame import Array, Frame
 from jflnr.metrics import display, exposure, measure
 
 NAME = "flnr"
@@ -22,7 +24,8 @@ MINUTES = 2
 
 COLUMNS = PICTURE | {"energy": "energy", "ms": "ms, 640 x 360"}
 SHOWN = ("noisy", "OIDN, tuned", "flr-adaptive", "flnr", "reference")
-CROP = 160
+SHADOWED = ("noisy", "OIDN, tuned", "flr", "flr-adaptive", "flnr", "reference")
+CROP, SHADOW = 160, 80
 
 
 def methods() -> list[Method]:
@@ -70,21 +73,50 @@ def draw(result: dict[str, Any], folder: Path) -> None:
     by_gain = sorted(labels, key=lambda f: psnr["flnr", f] - psnr["flr-adaptive", f])
     paths = {data.label(p): p for p in [data.SHIPPED, *data.frames("test")]}
     for label, name in ((by_gain[-1], "best"), (by_gain[0], "worst")):
-        picture = _crops(data.read(paths[label]))
-        Image.fromarray(picture).save(folder / f"flnr_{name}.png")
+        shown = _shown(data.read(paths[label]), SHOWN)
+        change = np.sum((shown["flnr"] - shown["flr-adaptive"]) ** 2, axis=-1)
+        _save(folder / f"flnr_{name}.png", [_strip(shown, change, CROP)])
+    one_each = {label.rsplit("_", 1)[0]: label for label in sorted(labels, reverse=True)}
+    strips = [_shadow(data.read(paths[label])) for label in one_each.values()]
+    _save(folder / "flnr_shadows.png", strips)
 
 
-def _crops(frame: Frame) -> np.ndarray:
-    """Side by side, the part of the frame where `flnr` and `flr-adaptive` differ most."""
+def _shadow(frame: Frame) -> np.ndarray:
+    """Side by side, the part of the frame whose light the guides explain least.
+
+    There even plain FLR of the reference itself is far from the reference.
+    """
+    shown = _shown(frame, SHADOWED)
+    explained = _display(frame, denoise(replace(frame, indirect=_reference(frame)), "flr"))
+    return _strip(shown, np.sum((explained - shown["reference"]) ** 2, axis=-1), SHADOW)
+
+
+def _shown(frame: Frame, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Displayed pictures by name of the method."""
+    lights: dict[str, Array] = {m.name: m(frame) for m in methods() if m.name in names}
+    lights["reference"] = _reference(frame)
+    return {name: _display(frame, lights[name]) for name in names if name in lights}
+
+
+def _display(frame: Frame, light: Array) -> np.ndarray:
     albedo = np.asarray(frame.albedo, np.float64)
-    lights = {m.name: m(frame) for m in methods() if m.name in SHOWN}
-    lights["reference"] = np.asarray(frame.reference)
-    scale = exposure(albedo * lights["reference"])
-    shown = {name: display(albedo * light, scale) for name, light in lights.items()}
-    change = np.sum((shown["flnr"] - shown["flr-adaptive"]) ** 2, axis=-1)
-    rows, columns = (size // CROP for size in change.shape)
-    blocks = change[: rows * CROP, : columns * CROP].reshape(rows, CROP, columns, CROP)
+    return display(albedo * np.asarray(light), exposure(albedo * _reference(frame)))
+
+
+def _reference(frame: Frame) -> np.ndarray:
+    return np.asarray(frame.reference)
+
+
+def _strip(shown: dict[str, np.ndarray], change: np.ndarray, side: int) -> np.ndarray:
+    """Side by side, the square of all pictures in which most has changed."""
+    rows, columns = (size // side for size in change.shape)
+    blocks = change[: rows * side, : columns * side].reshape(rows, side, columns, side)
     y, x = np.unravel_index(np.argmax(blocks.sum((1, 3))), (rows, columns))
-    part = np.s_[y * CROP : (y + 1) * CROP, x * CROP : (x + 1) * CROP]
-    panels = [shown[name][part] for name in SHOWN if name in shown]
-    return (255 * np.concatenate(panels, axis=1) + 0.5).astype(np.uint8)
+    part = np.s_[y * side : (y + 1) * side, x * side : (x + 1) * side]
+    return np.concatenate([picture[part] for picture in shown.values()], axis=1)
+
+
+def _save(path: Path, strips: list[np.ndarray]) -> None:
+    """One strip below the other, doubled in size."""
+    picture = np.concatenate(strips).repeat(2, 0).repeat(2, 1)
+    Image.fromarray((255 * picture + 0.5).astype(np.uint8)).save(path)

@@ -52,7 +52,9 @@ def test_crops_to_finetune_on_have_no_reference():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["flnr_spp", "optimisers", "learning_curve", "finetune"])
+@pytest.mark.parametrize(
+    "name", ["flnr_spp", "paper_form", "optimisers", "learning_curve", "finetune"]
+)
 def test_quick_versions(name, tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "FOLDER", tmp_path / "cache")
     assert main(["run", name, "--quick", "--out", str(tmp_path)]) == 0

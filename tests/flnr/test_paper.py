@@ -42,3 +42,21 @@ def test_scales_with_the_light_and_is_flr_on_the_guides_it_makes(params, scene):
     model, mapped = paper.apply(params, read)
     plain = flr(target, model, DEFAULT, guides_map=mapped, block=8, support=24)
     np.testing.assert_allclose(once, plain, rtol=1e-4, atol=1e-5)
+
+
+def test_network_and_regularisation_are_learned_together(params, scene):
+    """A step against the gradient brings the light nearer to what it should be."""
+    target, guides = (jnp.asarray(a[:24, :32]) for a in scene)
+    wanted = jnp.mean(target, axis=(0, 1)) * (1 + guides[..., :1])
+
+    def loss(both):
+        light = paper.flnr_of_paper(target, guides, *both, block=8, support=24)
+        return jnp.mean((light - wanted) ** 2)
+
+    both = (params, jax.tree.map(jnp.float32, DEFAULT))
+    before, gradient = jax.value_and_grad(loss)(both)
+    for slope in jax.tree.leaves(gradient[1]):
+        assert np.isfinite(slope) and slope != 0
+    length = jnp.sqrt(sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(gradient)))
+    after = loss(jax.tree.map(lambda value, slope: value - 1e-2 * slope / length, both, gradient))
+    assert after < before
