@@ -28,10 +28,10 @@ from jflnr.metrics import measure
 
 NAME = "paper_form"
 QUESTION = "What does FLNR's network in the paper's own form reach with the same frames?"
-MINUTES = 35
+MINUTES = 30
 
 # Of a processor, and steps between validations.
-TRAINING, EVERY = 30 * 60, 100
+TRAINING, EVERY = 25 * 60, 100
 BLOCK, SUPPORT = 8, 72
 OURS = ("flr", "flr-adaptive", "flnr")
 COLUMNS = PICTURE | {"ms": "ms, 640 x 360"}
