@@ -65,7 +65,8 @@ def _measured(frame: Frame, method: Method) -> dict[str, Any]:
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """flnr_table.md, and crops of the frames that gain most and least over adaptive FLR."""
+    """flnr_table.md; crops of the frames that gain most and least over adaptive FLR, the whole of
+    the worst, and a square of each scene that the guides do not explain."""
     text = results.table(result["means"], COLUMNS) + "\n" + per_frame(result["frames"])
     plots.write_text(folder / "flnr_table.md", text)
     psnr = {(row["method"], row["frame"]): row["psnr"] for row in result["frames"]}
@@ -76,6 +77,10 @@ def draw(result: dict[str, Any], folder: Path) -> None:
         shown = _shown(data.read(paths[label]), SHOWN)
         change = np.sum((shown["flnr"] - shown["flr-adaptive"]) ** 2, axis=-1)
         _save(folder / f"flnr_{name}.png", [_strip(shown, change, CROP)])
+    lowest = data.read(paths[min(labels, key=lambda label: psnr["flnr", label])])
+    whole = _shown(lowest, ("flnr", "reference"))
+    whole["difference"] = np.abs(whole["flnr"] - whole["reference"])
+    _save(folder / "flnr_lowest.jpg", [np.concatenate(list(whole.values()), axis=1)], times=1)
     one_each = {label.rsplit("_", 1)[0]: label for label in sorted(labels, reverse=True)}
     strips = [_shadow(data.read(paths[label])) for label in one_each.values()]
     _save(folder / "flnr_shadows.png", strips)
@@ -116,7 +121,7 @@ def _strip(shown: dict[str, np.ndarray], change: np.ndarray, side: int) -> np.nd
     return np.concatenate([picture[part] for picture in shown.values()], axis=1)
 
 
-def _save(path: Path, strips: list[np.ndarray]) -> None:
-    """One strip below the other, doubled in size."""
-    picture = np.concatenate(strips).repeat(2, 0).repeat(2, 1)
+def _save(path: Path, strips: list[np.ndarray], times: int = 2) -> None:
+    """One strip below the other, so many times as large."""
+    picture = np.concatenate(strips).repeat(times, 0).repeat(times, 1)
     Image.fromarray((255 * picture + 0.5).astype(np.uint8)).save(path)
