@@ -60,7 +60,8 @@ def run(quick: bool) -> dict[str, Any]:
     paths = [data.SHIPPED] if quick else training.frames()
     crops = [crop for some in examples.read(paths, 0) for crop in some]
     kept = [data.read(path) for path in ([data.SHIPPED] if quick else data.frames("val"))]
-    best, history = train(crops, kept, quick)
+    file = resume.FOLDER / f"{NAME}{'-quick' * quick}.state"
+    best, history = train(crops, kept, quick, file)
     mine = Method("FLNR, the paper's form", "jflnr", of_paper, {"trained": best})
     methods = [*(Method(name, "jflnr", denoise, {"method": name}) for name in OURS), mine]
     judged = [data.SHIPPED] if quick else data.frames("test")
@@ -72,14 +73,16 @@ def run(quick: bool) -> dict[str, Any]:
     ]
     clock = times(methods, data.read(judged[0]), quick)
     means = [mean_of(frames, m.name) | {"ms": clock[m.name]} for m in methods]
-    facts = {"frames": len(paths), "crops": len(crops), "weights": _size(best.network)}
+    weights = sum(leaf.size for leaf in jax.tree.leaves(best.network))
+    facts = {"frames": len(paths), "crops": len(crops), "weights": weights}
+    file.unlink()  # not before: what is trained survives an interruption of the measurement
     return {"means": means, "frames": frames, "history": history, "facts": facts}
 
 
 def train(
-    crops: Sequence[examples.Crop], kept: Sequence[Frame], quick: bool
+    crops: Sequence[examples.Crop], kept: Sequence[Frame], quick: bool, file: Path
 ) -> tuple[Trained, list[dict[str, float]]]:
-    """The weights that are best on `kept`, and PSNR there by steps; goes on where it stopped."""
+    """The weights that are best on `kept`, and PSNR there by steps; goes on from the state in `file`."""
     settings = Settings(every=1 if quick else EVERY)
     solver = Adam(_loss, rate_of(settings))
     update = jax.jit(solver.update)
@@ -88,7 +91,6 @@ def train(
     params = Trained(network, jax.tree.map(jnp.float32, DEFAULT))
     state, best, spent = solver.init_state(params), params, 0.0
     history: list[dict[str, float]] = []
-    file = resume.FOLDER / f"{NAME}{'-quick' * quick}.state"
     about = {"crops": len(crops), "every": settings.every}
     if file.exists():
         (params, state, best), history = load_state(file, (params, state, best), about)
@@ -108,7 +110,6 @@ def train(
         file.parent.mkdir(parents=True, exist_ok=True)
         save_state(file, (params, state, best), history, about)
         print(f"  step {entry['step']}: {entry['psnr']:.2f} dB on val", flush=True)
-    file.unlink()
     return best, history
 
 
@@ -158,10 +159,6 @@ def _loss(trained: Trained, data: Known) -> jax.Array:
         return loss.shown_error(light * known.albedo * known.exposure, known.target)
 
     return jnp.mean(jax.vmap(one)(data))
-
-
-def _size(params: Any) -> int:
-    return sum(leaf.size for leaf in jax.tree.leaves(params))
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
