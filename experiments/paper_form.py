@@ -82,7 +82,7 @@ def run(quick: bool) -> dict[str, Any]:
 def train(
     crops: Sequence[examples.Crop], kept: Sequence[Frame], quick: bool, file: Path
 ) -> tuple[Trained, list[dict[str, float]]]:
-    """The weights that are best on `kept`, and PSNR there by steps; goes on from the state in `file`."""
+    """The weights best on `kept`, and PSNR there by steps; goes on from the state in `file`."""
     settings = Settings(every=1 if quick else EVERY)
     solver = Adam(_loss, rate_of(settings))
     update = jax.jit(solver.update)
