@@ -67,7 +67,7 @@ def record(path: str) -> None:
     file = data.frames("test")[0]
     frame = data.read(file)
     frame = dataclasses.replace(frame, motion=np.zeros((*frame.depth.shape[:2], 2), np.float32))
-    later = dataclasses.replace(frame, indirect=data.read(file, 2).indirect)
+    later = dataclasses.replace(frame, indirect=data.read(file, 4).indirect)
     found: dict[str, np.ndarray] = {}
     for name, call in cases(frame, later):
         times = []
