@@ -6,9 +6,9 @@ import pytest
 
 import jflnr
 from jflnr.fitting import fit
-from jflnr.flnr.loss import shown_error
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import Parameters
+from jflnr.network.loss import shown_error
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.parameters import Parameters
 from jflnr.frame import Frame
 from jflnr.metrics import exposure
 

@@ -47,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     from jflnr import checks
     from jflnr.denoising import BLOCK
     from jflnr.fitting import METHODS, fit
-    from jflnr.flr.parameters import numbers_of, save_parameters
     from jflnr.guides import choose
+    from jflnr.regression.parameters import numbers_of, save_parameters
 
     checks.choice("--method", arguments.method, METHODS)
     if arguments.output.exists() and not arguments.overwrite:

@@ -8,7 +8,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
     from jflnr import checks
     from jflnr.denoising import BACKENDS, BLOCK, METHODS
-    from jflnr.flr import parameters
+    from jflnr.regression import parameters
 
     checks.choice("--method", arguments.method, METHODS)
     checks.choice("--backend", arguments.backend, BACKENDS)
@@ -37,7 +37,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
 def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
     """As `settings_of`, for methods that have no sigma, eps and eps' to set."""
     from jflnr.denoising import BLOCK
-    from jflnr.flnr import METHODS, weights
+    from jflnr.network import METHODS, weights
 
     learned = arguments.method in ("flr-adaptive", *METHODS)
     for name in ("sigma", "eps", "eps_prime", *(() if learned else ("params",))):
@@ -62,7 +62,7 @@ def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _load(arguments: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
     """The parameters that `--params` names, which must be the method's."""
-    from jflnr.flr.parameters import load_parameters, method_of
+    from jflnr.regression.parameters import load_parameters, method_of
 
     model, about = load_parameters(arguments.params)
     if (fitted := method_of(model)) != arguments.method:

@@ -11,8 +11,8 @@ import pytest
 import jflnr
 from jflnr import exr, fitting
 from jflnr.cli import main
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
-from jflnr.flr.parameters import Parameters, load_parameters
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
+from jflnr.regression.parameters import Parameters, load_parameters
 from jflnr.frame import Frame, read_frame, write_frame
 
 

@@ -12,7 +12,7 @@ from sybil.parsers import markdown
 
 from jflnr import exr
 from jflnr.cli import main
-from jflnr.flr.parameters import DEFAULT, save_parameters
+from jflnr.regression.parameters import DEFAULT, save_parameters
 from jflnr.frame import Frame, write_frame
 from tests.layouts.blender_passes import passes
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import jflnr
-from jflnr.flr.parameters import DEFAULT, Parameters
-from jflnr.flr.regression import flr
+from jflnr.regression.parameters import DEFAULT, Parameters
+from jflnr.regression.flr import flr
 from jflnr.frame import Frame
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)

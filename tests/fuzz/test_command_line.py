@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from jflnr.cli import main
-from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.parameters import load_parameters
+from jflnr.regression.adaptive_parameters import AdaptiveParameters
+from jflnr.regression.parameters import load_parameters
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
 long = functools.partial(settings, deadline=None, database=None)

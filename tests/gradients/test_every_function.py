@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 from jax import random
 
-from jflnr.flnr import paper, regression
-from jflnr.flnr.loss import relative
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.elimination import solve_strips
-from jflnr.flr.energy import rescale, restore
-from jflnr.flr.moments import collect, plane_count
-from jflnr.flr.noisy_guides import smooth_guide
-from jflnr.flr.parameters import Parameters
-from jflnr.flr.pyramid import double, halve
-from jflnr.flr.solve import cholesky_solve, solve
-from jflnr.flr.uncertainty import flr_adaptive_with_error
-from jflnr.flr.weighted_moments import collect_weighted
-from jflnr.flr.window import gather_moments, window_over
+from jflnr.network import paper, regression
+from jflnr.network.loss import relative
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.elimination import solve_strips
+from jflnr.regression.energy import rescale, restore
+from jflnr.regression.moments import collect, plane_count
+from jflnr.regression.noisy_guides import smooth_guide
+from jflnr.regression.parameters import Parameters
+from jflnr.regression.pyramid import double, halve
+from jflnr.regression.solve import cholesky_solve, solve
+from jflnr.regression.uncertainty import flr_adaptive_with_error
+from jflnr.regression.weighted_moments import collect_weighted
+from jflnr.regression.window import gather_moments, window_over
 from jflnr.frame import Frame, composite
-from jflnr.selection import nested
+from jflnr.auto import nested
 from jflnr.temporal import (
     Average,
     Camera,

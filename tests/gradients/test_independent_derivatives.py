@@ -12,8 +12,8 @@ from experiments.stability import solvers
 from experiments.stability.cases import make
 from experiments.stability.methods import by_numpy
 from jflnr.fitting import smape
-from jflnr.flr.parameters import DEFAULT, Parameters
-from jflnr.flr.regression import flr
+from jflnr.regression.parameters import DEFAULT, Parameters
+from jflnr.regression.flr import flr
 
 
 @jax.jit

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.flr.parameters import Parameters
+from jflnr.regression.parameters import Parameters
 from jflnr.opencl import Context, NoDevice
 
 PARAMETERS = Parameters.of(sigma=12.0, eps=1e-3, eps_prime=1e-4)

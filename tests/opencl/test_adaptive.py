@@ -8,9 +8,9 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.flr.adaptive import flr_adaptive as jax_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.noisy_guides import smooth_guide as jax_smooth
+from jflnr.regression.adaptive import flr_adaptive as jax_adaptive
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.noisy_guides import smooth_guide as jax_smooth
 from jflnr.opencl import Context, flr_adaptive, smooth_guide
 from tests.opencl import tolerances
 from tests.opencl.conftest import error, scene

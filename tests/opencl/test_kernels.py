@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from jflnr.flr import apply as jax_apply
-from jflnr.flr import blur as jax_blur
-from jflnr.flr import moments as jax_moments
-from jflnr.flr import solve as jax_solve
+from jflnr.regression import apply as jax_apply
+from jflnr.regression import blur as jax_blur
+from jflnr.regression import moments as jax_moments
+from jflnr.regression import solve as jax_solve
 from jflnr.opencl import Context
 from jflnr.opencl.apply import apply
 from jflnr.opencl.blur import blur

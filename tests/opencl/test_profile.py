@@ -9,8 +9,8 @@ import pytest
 
 import jflnr
 from jflnr.cli import main
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.noisy_guides import smooth_guide
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.noisy_guides import smooth_guide
 from jflnr.guides import DEFAULT, layers
 from jflnr.opencl import Context, flr, flr_adaptive
 from jflnr.opencl.profile import profile

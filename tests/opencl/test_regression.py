@@ -1,4 +1,4 @@
-"""The four kernels together, against `jflnr.flr.regression.flr` and its twin in plain numpy."""
+"""The four kernels together, against `jflnr.regression.flr.flr` and its twin in plain numpy."""
 
 from pathlib import Path
 from typing import Any
@@ -8,8 +8,8 @@ import pytest
 
 import jflnr
 from jflnr import guides as guide_layers
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr as jax_flr
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr as jax_flr
 from jflnr.opencl import Context, flr
 from tests.opencl import tolerances
 from tests.opencl.conftest import PARAMETERS, error, in_float64, scene

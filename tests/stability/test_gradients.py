@@ -9,12 +9,12 @@ import pytest
 
 from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
-from jflnr.flnr.regression import flnr
-from jflnr.flnr.weights import shipped
-from jflnr.flr.adaptive import flr_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.network.flnr import flnr
+from jflnr.network.weights import shipped
+from jflnr.regression.adaptive import flr_adaptive
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 
 FIVE_GUIDES = [case for case in CASES if "16" not in case]
 
