@@ -1,3 +1,4 @@
+# ruff: noqa: F401
 """Denoising of one-sample path-traced light by Fast Local (Neural) Regression."""
 
 import importlib

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 import importlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -16,6 +16,9 @@ from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
 from jflnr.methods import BACKENDS, DEFAULT, method_of
 from jflnr.stages import Parts, regress
+
+if TYPE_CHECKING:
+    from jflnr.large.source import Rows
 
 SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 
@@ -88,12 +91,12 @@ class Denoiser:
         names, inputs = prepare(frame, self.guides, self.method)
         method = self.method.for_frame(inputs, names)
         if hasattr(method, "step"):
-            light = self._step(self._start(frame), frame)[1]
+            light = self._step(self.start(frame), frame)[1]
             return _given({"image": light}, frame, out)
         if hasattr(method, "denoise"):
             return _given({"image": method.denoise(inputs, names)}, frame, out)
         if self.tile is not None:
-            return _given(self._tiled(inputs, method, names), frame, out)
+            return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":
             return _given(_whole(method, inputs, names), frame, out)
         return self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
@@ -103,7 +106,7 @@ class Denoiser:
 
         frame: with `motion`. `state` is what is left to the next one; None begins another shot.
         """
-        state = self._start(frame) if self.state is None else self.state
+        state = self.start(frame) if self.state is None else self.state
         self.state, light = self._step(state, frame)
         return _given({"image": light}, frame, out)
 
@@ -116,31 +119,40 @@ class Denoiser:
             return self._device
         return default_context() if self._device is None else Context(self._device)
 
-    def _smooth(self, *layers: Any) -> Any:
+    def _smooth(self, guide: Any, normal: Any, depth: Any) -> Any:
         from jflnr.opencl import smooth_guide
 
-        return smooth_guide(*layers, context=self.context)
+        return smooth_guide(guide, normal, depth, context=self.context)
 
     def _on_device(self, method: Any) -> Callable[..., Any]:
         from jflnr.opencl import twins
 
         return lambda images, out=None: twins.regress(method, images, self.context, out=out)
 
-    def _tiled(self, inputs: Frame, method: Any, names: tuple[str, ...]) -> Parts:
-        from jflnr.large import source
+    def strips(
+        self, rows: Rows, names: tuple[str, ...], tile: int, folder: Path | None = None
+    ) -> Iterator[tuple[int, Parts]]:
+        """A frame that is read by rows in denoised strips, from top to bottom (docs/large.md).
 
-        found = [parts for _, parts in self.strips(source.rows_of(inputs), method, names)]
-        return {name: np.concatenate([parts[name] for parts in found]) for name in found[0]}
-
-    def strips(self, rows: Any, method: Any, names: tuple[str, ...], folder: Any = None) -> Any:
-        """The strips of a frame that is read by rows, from top to bottom (`jflnr.large`)."""
+        rows: `jflnr.large.source.rows_of` a frame, or of a file. names: of the guides. tile: as of
+        `denoise`. folder: for temporary files; the system's own if None.
+        Yields the first row of each strip, and by name `image`, `(h, W, C)`, and more.
+        """
         from jflnr.large import tiled
 
+        method = self.method.for_frame(rows.shapes(), names)
         if self.backend == "jax":
-            return tiled.strips(rows, method, names, self.tile, folder)
-        return tiled.overlapping(rows, method, names, self.tile, self._on_device(method))
+            return tiled.strips(rows, method, names, tile, folder)
+        return tiled.overlapping(rows, method, names, tile, self._on_device(method))
 
-    def _start(self, frame: Frame) -> Any:
+    def _tiled(self, frame: Frame, names: tuple[str, ...], tile: int) -> Parts:
+        from jflnr.large.source import rows_of
+
+        found = [parts for _, parts in self.strips(rows_of(frame), names, tile)]
+        return {name: np.concatenate([parts[name] for parts in found]) for name in found[0]}
+
+    def start(self, frame: Frame) -> Any:
+        """The state before the first frame of a shot, of which only the shapes count."""
         return self._over_time[0](frame)
 
     def _step(self, state: Any, frame: Frame) -> tuple[Any, Any]:

@@ -161,7 +161,7 @@ def position(frame: Frame) -> Array:
 
 
 def accumulate_light(
-    taps: Taps, history: History, light: Array, least: float
+    taps: Taps, history: History, light: Array, least: Array | float
 ) -> tuple[jax.Array, jax.Array]:
     """Phase I: mean of the samples at each place, with an age limit (section 3.2).
 
@@ -177,7 +177,7 @@ def accumulate_light(
 
 
 def accumulate_fitted(
-    taps: Taps, history: History, fitted: jax.Array, count: jax.Array, least: float
+    taps: Taps, history: History, fitted: jax.Array, count: jax.Array, least: Array | float
 ) -> jax.Array:
     """Phase III: the same of the fitted light, with the sample count of phase I (section 3.5).
 

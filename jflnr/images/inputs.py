@@ -76,13 +76,16 @@ def same_size(frame: Frame, method: str) -> None:
 
 
 def plain_images(
-    frame: Frame, names: tuple[str, ...], scene: guide_layers.Scene | None = None
+    frame: Frame,
+    names: tuple[str, ...],
+    scene: guide_layers.Scene | None = None,
+    smooth: Callable[..., Array] | None = None,
 ) -> dict[str, Any]:
     """The layers as they are; numpy's stay where they are.
 
     target: the light. guides: averaged over its pixels, if these are larger. guides_map: the guides
     that the models are evaluated on, if those are others. weight: which pixels count, or None.
-    scene: of the frame that this one is a part of; the frame's own if None.
+    scene: of the frame that this one is a part of; the frame's own if None. smooth: not used.
     """
     target, mask = frame.indirect, frame.mask
     layers = guide_layers.layers(frame, names, scene)

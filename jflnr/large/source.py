@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -25,6 +27,14 @@ class Rows:
     width: int
     read: Callable[[int, int], Frame]
     factor: int = 1
+
+    def shapes(self) -> Frame:
+        """The frame, but for what is in it."""
+        rows = self.read(0, self.factor)
+        light = -(-self.height // self.factor)
+        grow = lambda a, height: jax.ShapeDtypeStruct((height, *a.shape[1:]), a.dtype)
+        whole = jax.tree.map(lambda a: grow(a, self.height), rows)
+        return dataclasses.replace(whole, indirect=grow(rows.indirect, light))
 
 
 def rows_of(frame: Frame) -> Rows:

@@ -63,8 +63,8 @@ class Job:
         sides += [self.kept[name].side for name in stage.reads]
         align = math.lcm(stage.align, self.rows.factor, *sides)
         if 1 not in sides and not stage.pixels:
-            lines = (pieces(size, tile, stage.reach, align) for size in (height, width))
-            return list(itertools.product(*lines))
+            down, across = (pieces(n, tile, stage.reach, align) for n in (height, width))
+            return list(itertools.product(down, across))
         strip, reach = max(tile * tile // width, 1), stage.reach + self.method.margin
         return [(rows, Piece(0, width, 0, width)) for rows in pieces(height, strip, reach, align)]
 

@@ -116,7 +116,7 @@ class FLNR(AdaptiveFLR):
 
     def with_network(self) -> tuple[Stage, ...]:
         """What the network says, the fits as it says, and pass 3."""
-        side, scales = self.finest, unet.scales_of(self.params)
+        side, scales = self.finest, unet.scales_of(self.with_weights().params)
         return (
             Stage(
                 steer,

@@ -1,4 +1,4 @@
-"""Adaptive FLR on an OpenCL device: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
+"""Adaptive FLR on OpenCL devices: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ class Restored(NamedTuple):
     rate: Any
     brightness: Any
     own: Grid
-    floor: float
+    floor: Any
 
 
 def apply(

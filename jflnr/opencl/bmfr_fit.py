@@ -21,7 +21,7 @@ def fit(
     layers: dict[str, Any],
     number: Any,
     block: int,
-    noise: float,
+    noise: Any,
 ) -> Any:
     """Phase II: `jflnr.bmfr.fit.fit` of normal and position with its squares, not below 0.
 

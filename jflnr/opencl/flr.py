@@ -56,7 +56,7 @@ def flr(
     moments = collect(context, y, x, shift, method.block, counts)
     block, step = method.block, method.side
     size = -(-target.shape[0] // block), -(-target.shape[1] // block)
-    reach = min(-(-method.support // step), max(size))
+    reach = min(-(-(method.support or 0) // step), max(size))
     moments = blur(context, moments, float(method.sigma) / step, reach)
     model = solve(context, moments, shift, method, count, channels)
     apply(context, model, x_map, shift, step, (*size, model.shape[3]), output)

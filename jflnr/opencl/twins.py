@@ -13,7 +13,7 @@ from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.flr import FLR
 from jflnr.stages import Parts
 
-REGRESSIONS = {FLR: flr, AdaptiveFLR: flr_adaptive, FLNR: flnr}
+REGRESSIONS: dict[type, Any] = {FLR: flr, AdaptiveFLR: flr_adaptive, FLNR: flnr}
 
 
 def regress(method: Any, images: Parts, context: Context, **options: Any) -> Any:

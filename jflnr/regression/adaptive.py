@@ -172,7 +172,7 @@ def flr_adaptive(
     *,
     weight: jax.Array | None = None,
     **options: Any,
-) -> jax.Array:
+) -> Any:
     """Fit the guides to a noisy image, adapting to its noise and its edges.
 
     Scales with `target`. Not linear in it, but the channels are treated alike: images of three
@@ -240,8 +240,8 @@ def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
     expected = apply_rows(pilot, guides, shift, 4 * method.finest)[..., 0]
     light = light_of(target, known["unit"])
     weights, squares = _weights(light, guides, expected, known["mean"], parts["weight"], method)
-    light = target, guides, shift, weights, squares, method.finest, known["unit"]
-    return {"moments": jnp.concatenate(collect_weighted(*light))}
+    weighted = target, guides, shift, weights, squares, method.finest, known["unit"]
+    return {"moments": jnp.concatenate(collect_weighted(*weighted))}
 
 
 def grid_of(moments: jax.Array, block: int) -> Grid:
@@ -280,7 +280,8 @@ def merged_parts(
 
 def learn_rate(method: Any, known: Known, sums: Parts) -> Known:
     """How much brightness is given back."""
-    return {"rate": energy.rate(known["wanted"], *sums["kept"], method.slack)}
+    before, squares = sums["kept"]
+    return {"rate": energy.rate(known["wanted"], before, squares, method.slack)}
 
 
 def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 
 
-def gaussian_taps(sigma: jax.Array, reach: int, dtype: jnp.dtype) -> jax.Array:
+def gaussian_taps(sigma: jax.Array | float, reach: int, dtype: jnp.dtype) -> jax.Array:
     """Gaussian weights at -reach..reach with sum 1, differentiable in `sigma` at any value >= 0.
 
     sigma: standard deviation, in steps of the grid. Returns `(2 reach + 1,)`.
@@ -19,7 +19,7 @@ def gaussian_taps(sigma: jax.Array, reach: int, dtype: jnp.dtype) -> jax.Array:
     return taps / jnp.sum(taps)
 
 
-def blur(moments: jax.Array, sigma: jax.Array, reach: int) -> jax.Array:
+def blur(moments: jax.Array, sigma: jax.Array | float, reach: int) -> jax.Array:
     """Convolve every plane with a Gaussian, taking zeros outside the frame.
 
     Zeros are right there, because the plane of ones is blurred along with the rest and the

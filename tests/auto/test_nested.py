@@ -4,11 +4,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jflnr.regression.level import brightness
-from jflnr.regression.moments import collect
 from jflnr.auto.collected import Collected
 from jflnr.auto.nested import fit_orders
 from jflnr.auto.weights import squared_residual
+from jflnr.regression.level import brightness
+from jflnr.regression.moments import collect
 
 GROUPS = (3, 1)
 WEIGHTS = np.array([0.2126, 0.7152, 0.0722])

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from jflnr import denoising
-from jflnr.cli import main
-from jflnr.frame import Frame
 from jflnr.auto import method
 from jflnr.auto.plan import Plan
+from jflnr.cli import main
+from jflnr.frame import Frame
 
 
 @pytest.fixture

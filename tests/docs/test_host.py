@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jflnr.regression.parameters import DEFAULT
-from jflnr.regression.flr import flr
+from jflnr.regression.flr import DEFAULT, flr
 
 ROOT = Path(__file__).parents[2]
 

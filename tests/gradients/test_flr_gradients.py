@@ -10,12 +10,11 @@ from jax.test_util import check_grads
 
 from jflnr.regression.apply import apply
 from jflnr.regression.blur import blur, gaussian_taps
+from jflnr.regression.flr import FLR, flr
 from jflnr.regression.moments import collect
-from jflnr.regression.parameters import Parameters
-from jflnr.regression.flr import flr
 from jflnr.regression.solve import block_inverse_solve, cholesky_solve, solve
 
-PARAMETERS = Parameters.of(sigma=5.0, eps=1e-2, eps_prime=1e-2)
+PARAMETERS = FLR(sigma=5.0, eps=1e-2, eps_prime=1e-2)
 SHIFT = np.array([0.1, -0.2])
 
 

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jflnr.network import regression
-from jflnr.network.examples import Crop, Example, draw, read
 from jflnr.frame import Frame, write_frame
+from jflnr.network import flnr as regression
+from jflnr.network.examples import Crop, Example, draw, read
 
 if TYPE_CHECKING:
     from jflnr.network.train import Settings

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from jflnr.network import paper
-from jflnr.regression.parameters import DEFAULT
-from jflnr.regression.flr import flr
+from jflnr.regression.flr import DEFAULT, flr
 
 WIDTHS = (2, 3, 4)
 

@@ -4,9 +4,8 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.network import regression
-from jflnr.regression.adaptive import flr_adaptive
-from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.network import flnr as regression
+from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from tests.flnr.conftest import WIDTHS, scene_of
 
 flnr = jax.jit(
@@ -27,7 +26,7 @@ def denoised(scene, params, everywhere):
 def test_untrained_it_is_adaptive_flr(scene, everywhere):
     start = regression.init(jax.random.key(0), WIDTHS)
     ours = flnr(*scene, start, everywhere)
-    wanted = jax.jit(flr_adaptive)(*scene, ADAPTIVE_DEFAULT, weight=everywhere)
+    wanted = jax.jit(flr_adaptive)(*scene, AdaptiveFLR(), weight=everywhere)
     np.testing.assert_allclose(ours, wanted, atol=1e-5)
 
 

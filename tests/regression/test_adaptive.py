@@ -5,14 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jflnr.images.noisy_guides import smooth_guide
+from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.adaptive import flr_adaptive as uncompiled
-from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.regression.noisy_guides import smooth_guide
-from jflnr.regression.parameters import Parameters
-from jflnr.regression.flr import flr
+from jflnr.regression.flr import FLR, flr
 
 flr_adaptive = jax.jit(uncompiled, static_argnames=("block", "levels", "keep_energy"))
-EXACT_ENERGY = ADAPTIVE_DEFAULT.but(slack=1e-6)
+EXACT_ENERGY = AdaptiveFLR(slack=1e-6)
 
 
 def guides(rng, height, width, count=2):
@@ -36,12 +35,12 @@ def scene():
 @pytest.fixture(scope="module")
 def denoised(scene):
     x, y = scene
-    return flr_adaptive(y, x, ADAPTIVE_DEFAULT, levels=2)
+    return flr_adaptive(y, x, AdaptiveFLR(), levels=2)
 
 
 def test_without_adapting_it_is_flr(scene):
     x, y = scene
-    off = ADAPTIVE_DEFAULT.but(
+    off = AdaptiveFLR(
         sigma=2.0,
         noise_ridge=1e-30,
         position_ridge=1e30,
@@ -50,13 +49,13 @@ def test_without_adapting_it_is_flr(scene):
         slack=1e9,
     )
     ours = flr_adaptive(y, x, off, block=16, levels=1)
-    plain = flr(y, x, Parameters.of(16.0, 1e-4, 1e-4), block=8, support=40)
+    plain = flr(y, x, FLR(16.0, 1e-4, 1e-4), block=8, support=40)
     np.testing.assert_allclose(ours, plain, atol=1e-4)
 
 
 def test_scales_with_the_light(scene, denoised):
     x, y = scene
-    scaled = flr_adaptive(1000 * y, x, ADAPTIVE_DEFAULT, levels=2)
+    scaled = flr_adaptive(1000 * y, x, AdaptiveFLR(), levels=2)
     np.testing.assert_allclose(scaled / 1000, denoised, rtol=1e-3, atol=1e-4)
 
 
@@ -64,8 +63,8 @@ def test_light_groups_add_up(scene):
     x, y = scene
     share = jnp.float32(np.random.default_rng(5).random(y.shape))
     groups = jnp.concatenate([y * share, y * (1 - share)], axis=-1)
-    apart = flr_adaptive(groups, x, ADAPTIVE_DEFAULT, levels=2)
-    together = flr_adaptive(y, x, ADAPTIVE_DEFAULT, levels=2)
+    apart = flr_adaptive(groups, x, AdaptiveFLR(), levels=2)
+    together = flr_adaptive(y, x, AdaptiveFLR(), levels=2)
     np.testing.assert_allclose(apart[..., :3] + apart[..., 3:], together, atol=1e-4)
 
 
@@ -78,7 +77,7 @@ def test_less_noise_than_the_input_and_about_its_energy(scene, denoised):
 def test_energy_is_kept_exactly_on_demand(scene):
     x, y = scene
     weights = np.array([0.2126, 0.7152, 0.0722])
-    kept = flr_adaptive(y, x, ADAPTIVE_DEFAULT, levels=2, keep_energy=True)
+    kept = flr_adaptive(y, x, AdaptiveFLR(), levels=2, keep_energy=True)
     np.testing.assert_allclose(np.sum(kept @ weights), np.sum(y @ weights), rtol=1e-4)
 
 
@@ -90,7 +89,7 @@ def test_a_constant_stays_constant(scene):
 
 def test_black_stays_black(scene):
     x, y = scene
-    out = flr_adaptive(jnp.zeros_like(y), x, ADAPTIVE_DEFAULT, levels=2)
+    out = flr_adaptive(jnp.zeros_like(y), x, AdaptiveFLR(), levels=2)
     np.testing.assert_array_equal(out, 0)
 
 
@@ -98,18 +97,18 @@ def test_what_is_not_finite_is_as_good_as_masked(scene):
     x, y = scene
     bad = np.random.default_rng(7).random(y.shape[:2]) < 0.1
     spoiled = jnp.where(bad[..., None], jnp.nan, y)
-    out = flr_adaptive(spoiled, x, ADAPTIVE_DEFAULT, levels=2)
-    masked = flr_adaptive(y, x, ADAPTIVE_DEFAULT, levels=2, weight=jnp.float32(~bad))
+    out = flr_adaptive(spoiled, x, AdaptiveFLR(), levels=2)
+    masked = flr_adaptive(y, x, AdaptiveFLR(), levels=2, weight=jnp.float32(~bad))
     assert np.isfinite(out).all()
     np.testing.assert_allclose(out, masked, atol=1e-5)
-    assert np.isfinite(flr_adaptive(y * jnp.nan, x, ADAPTIVE_DEFAULT, levels=2)).all()
+    assert np.isfinite(flr_adaptive(y * jnp.nan, x, AdaptiveFLR(), levels=2)).all()
 
 
 @pytest.mark.slow  # compiles long
 @pytest.mark.parametrize("size", [(1, 1), (3, 70)])
 def test_small_and_odd_sizes(rng, size):
     x, y = jnp.float32(guides(rng, *size, 1)), jnp.float32(light(rng, *size))
-    out = flr_adaptive(y, x, ADAPTIVE_DEFAULT, levels=2)
+    out = flr_adaptive(y, x, AdaptiveFLR(), levels=2)
     assert out.shape == y.shape
     assert np.isfinite(out).all()
 
@@ -117,7 +116,7 @@ def test_small_and_odd_sizes(rng, size):
 @pytest.mark.slow  # compiles long
 def test_no_guides_at_all(scene):
     _, y = scene
-    out = flr_adaptive(y, jnp.zeros((*y.shape[:2], 0)), ADAPTIVE_DEFAULT, levels=2)
+    out = flr_adaptive(y, jnp.zeros((*y.shape[:2], 0)), AdaptiveFLR(), levels=2)
     assert np.isfinite(out).all()
 
 
@@ -128,7 +127,7 @@ def test_gradients_are_finite_and_of_use(scene):
     def loss(parameters, y, x):
         return jnp.mean(uncompiled(y, x, parameters, levels=2) ** 2)
 
-    gradients = jax.jit(jax.grad(loss, argnums=(0, 1, 2)))(ADAPTIVE_DEFAULT, y, x)
+    gradients = jax.jit(jax.grad(loss, argnums=(0, 1, 2)))(AdaptiveFLR(), y, x)
     leaves = jax.tree.leaves(gradients)
     assert all(np.isfinite(leaf).all() for leaf in leaves)
     assert sum(float(jnp.abs(leaf).max()) > 0 for leaf in leaves) >= 10
@@ -136,20 +135,20 @@ def test_gradients_are_finite_and_of_use(scene):
 
 def test_other_parameters_do_not_compile_again(scene):
     x, y = scene
-    flr_adaptive(y, x, ADAPTIVE_DEFAULT, levels=2)
+    flr_adaptive(y, x, AdaptiveFLR(), levels=2)
     before = flr_adaptive._cache_size()
-    flr_adaptive(y, x, ADAPTIVE_DEFAULT.but(sigma=1.5, caution=2.0), levels=2)
+    flr_adaptive(y, x, AdaptiveFLR(sigma=1.5, caution=2.0), levels=2)
     assert flr_adaptive._cache_size() == before
 
 
 def test_wrong_arguments_are_named(scene):
     x, y = scene
     with pytest.raises(ValueError, match="levels"):
-        uncompiled(y, x, ADAPTIVE_DEFAULT, levels=0)
+        uncompiled(y, x, AdaptiveFLR(), levels=0)
     with pytest.raises(ValueError, match="guides"):
-        uncompiled(y, x[:4], ADAPTIVE_DEFAULT)
+        uncompiled(y, x[:4], AdaptiveFLR())
     with pytest.raises(ValueError, match="caution"):
-        ADAPTIVE_DEFAULT.but(caution=-1)
+        AdaptiveFLR(caution=-1)
 
 
 def test_smoothing_a_guide_stops_at_edges(rng):

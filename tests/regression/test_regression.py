@@ -5,14 +5,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jflnr.regression.parameters import Parameters
+from jflnr.regression.flr import FLR
 from jflnr.regression.flr import flr as uncompiled
 from tests.oracle import flr_numpy
 
 flr = jax.jit(uncompiled, static_argnames=("block", "support", "solver"))
 
-PARAMETERS = Parameters.of(sigma=6.0, eps=1e-3, eps_prime=1e-4)
-EXACT = Parameters.of(sigma=6.0, eps=1e-12, eps_prime=1e-12)
+PARAMETERS = FLR(sigma=6.0, eps=1e-3, eps_prime=1e-4)
+EXACT = FLR(sigma=6.0, eps=1e-12, eps_prime=1e-12)
 
 
 def image(rng, height, width, channels):
@@ -65,7 +65,7 @@ def test_float32_is_close_to_float64(rng):
 def test_guides_far_from_zero_keep_their_digits(rng):
     offset = np.array([1e4, -3e3])
     x, y = np.float32(image(rng, 40, 40, 2) + offset), image(rng, 40, 40, 1)
-    tiny = Parameters.of(sigma=6.0, eps=1e-12, eps_prime=1e-4)
+    tiny = FLR(sigma=6.0, eps=1e-12, eps_prime=1e-4)
     ours = flr(jnp.float32(y), jnp.asarray(x), tiny)
     np.testing.assert_allclose(ours, flr_numpy.flr(y, x, 6.0, 1e-12, 1e-4), atol=2e-4)
 
@@ -157,7 +157,7 @@ def test_other_values_do_not_recompile(rng):
     compiled = jax.jit(lambda *arguments: uncompiled(*arguments))
     for sigma in (4.0, 9.0):
         x, y = jnp.float32(image(rng, 16, 24, 2)), jnp.float32(image(rng, 16, 24, 3))
-        compiled(y, x, Parameters.of(sigma, 1e-3, 1e-4))
+        compiled(y, x, FLR(sigma, 1e-3, 1e-4))
     assert compiled._cache_size() == 1
 
 
