@@ -9,8 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.elimination import solve_strips
+from jflnr.flr.division import divide
 from jflnr.flr.moments import index_xx, index_xy
+from jflnr.flr.solve import solve_strips
 from jflnr.flr.window import Window, gather, gather_moments, window_over
 
 
@@ -51,10 +52,8 @@ def brightness(channels: int, dtype: jnp.dtype) -> jax.Array:
 
 def mean_guides(moments: jax.Array, guides: int) -> jax.Array:
     """Each block's mean of [1, X - shift], `(Q + 1, h, w)`; [1, 0, ...] where it is empty."""
-    n = moments[:1]
     planes = moments[np.array([index_xx(i, 0) for i in range(guides + 1)])]
-    mean = planes * jnp.where(n > 1e-12, 1 / jnp.where(n > 1e-12, n, 1), 0)
-    return mean.at[0].set(1)
+    return (planes * divide(1, moments[:1], 1e-12)).at[0].set(1)
 
 
 def predict(coefficients: jax.Array, regressors: jax.Array) -> jax.Array:

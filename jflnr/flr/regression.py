@@ -8,9 +8,10 @@ from jflnr import checks
 from jflnr.flr.apply import apply
 from jflnr.flr.arguments import check_regression
 from jflnr.flr.blur import blur
+from jflnr.flr.elimination import SOLVERS, Solver
 from jflnr.flr.moments import Guides, centre, collect
 from jflnr.flr.parameters import Parameters
-from jflnr.flr.solve import SOLVERS, Solver, solve
+from jflnr.flr.solve import solve
 
 
 def flr(

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from jflnr.flr.elimination import ROUNDING
 from jflnr.flr.moments import plane_count
+from jflnr.flr.solve import ROUNDING_OF_STRIPS as ROUNDING
 from jflnr.opencl.grids import Grid, Run
 
 

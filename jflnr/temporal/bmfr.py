@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from jflnr import checks
+from jflnr.flr.division import divide
 from jflnr.frame import Array, Frame
 from jflnr.temporal.bmfr_fit import fit, grid_offset
 from jflnr.temporal.bmfr_taa import smooth
@@ -100,7 +101,7 @@ def step(
     known = history.samples > 0
     picture = smooth(frame.albedo * fitted, history.picture, known, moved, parameters.picture_share)
     bright = inside & (frame.albedo > DARK)
-    image = jnp.where(bright, picture / jnp.where(bright, frame.albedo, 1), fitted)
+    image = jnp.where(bright, divide(picture, frame.albedo, DARK), fitted)
     # A pixel without a sample so far has nothing to hand on.
     surface = Surface.of(frame)._replace(depth=jnp.where(count > 0, frame.depth, 0))
     return History(history.number + 1, surface, count, light, fitted, picture), image

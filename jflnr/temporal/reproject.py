@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jflnr import checks
+from jflnr.flr.division import divide
 from jflnr.frame import Array, Frame
 
 # A tap may be off the pixel's tangent plane by this share of the depth. Positions that are stored
@@ -132,5 +133,4 @@ def _alike(here: Surface, there: Surface, tolerance: jax.Array, same_normal: flo
 
 def _shares(weight: jax.Array) -> jax.Array:
     """The weights over their sum, or 0."""
-    total = jnp.sum(weight, axis=-1, keepdims=True)
-    return weight / jnp.where(total > 0, total, 1)
+    return divide(weight, jnp.sum(weight, axis=-1, keepdims=True))
