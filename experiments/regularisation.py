@@ -17,9 +17,10 @@ from jflnr import guides
 from jflnr.denoising import BLOCK
 from jflnr.flr.apply import apply
 from jflnr.flr.blur import blur
+from jflnr.flr.elimination import cholesky_solve
 from jflnr.flr.moments import collect, index_xx, index_xy
 from jflnr.flr.parameters import DEFAULT, Parameters
-from jflnr.flr.solve import cholesky_solve, solve
+from jflnr.flr.solve import solve
 
 NAME = "regularisation"
 QUESTION = "How do accuracy and stability depend on eps and eps', and is Tikhonov as good?"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 
 
-def divide(x: jax.Array | float, n: jax.Array, least: float = 0) -> jax.Array:
-    """`x / n` where n is above `least`, else 0; x does not matter there, unless it is not finite.
+def divide(x: Any, n: Any, least: Any = 0) -> jax.Array:
+    """`x / n`, arrays or numbers, where n is above `least`, else 0; x does not matter there, unless it is not finite.
 
     Both branches of a `where` are differentiated, so n is 1 in the one that is not taken.
     """

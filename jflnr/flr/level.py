@@ -11,6 +11,7 @@ import numpy as np
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
 from jflnr.flr.division import divide
 from jflnr.flr.moments import index_xx, index_xy
+from jflnr.flr.pyramid import halve
 from jflnr.flr.solve import solve_strips
 from jflnr.flr.window import Window, gather, gather_moments, window_over
 
@@ -25,6 +26,14 @@ class Grid(NamedTuple):
     moments: jax.Array
     noise: jax.Array
     block: int
+
+    def pyramid(self, levels: int) -> list[Grid]:
+        """This grid and coarser ones, each of half the resolution."""
+        grids = [self]
+        for _ in range(levels - 1):
+            last = grids[-1]
+            grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+        return grids
 
 
 class Fit(NamedTuple):

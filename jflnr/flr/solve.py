@@ -128,8 +128,8 @@ def solve_strips(
     """
 
     def solve_some(strip: tuple[jax.Array, jax.Array, jax.Array]) -> jax.Array:
-        moments, *regular = strip
-        system = normal_equations(moments, shift, *regular, channels, ROUNDING_OF_STRIPS)
+        moments, eps, eps_prime = strip
+        system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING_OF_STRIPS)
         return system.models(eliminate(system.correlation, system.right))
 
     return map_rows(solve_some, (moments, eps, eps_prime), STRIP)

@@ -61,8 +61,8 @@ def fit_orders(
 def _fit(
     planes: tuple[jax.Array, ...], *, shift: jax.Array, groups: tuple[int, ...], channels: int
 ) -> Orders:
-    moments, *regular, noise = planes
-    system = normal_equations(moments, shift, *regular, channels, ROUNDING_OF_STRIPS)
+    moments, eps, eps_prime, noise = planes
+    system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING_OF_STRIPS)
     if not groups:
         return Orders(system.mean_y[None], system.scale, system.scale)
     factored = factor(system.correlation, system.right)

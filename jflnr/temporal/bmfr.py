@@ -12,8 +12,10 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jflnr import checks
+from jflnr.camera import centres, from_centre
 from jflnr.flr.division import divide
 from jflnr.frame import Array, Frame
 from jflnr.temporal.bmfr_fit import fit, grid_offset
@@ -138,8 +140,9 @@ def position(frame: Frame) -> Array:
     if frame.position is not None:
         return frame.position
     height, width = frame.depth.shape[:2]
-    y, x = jnp.mgrid[:height, :width] + 0.5
-    return frame.depth * jnp.stack([x - width / 2, y - height / 2, jnp.ones_like(x)], axis=-1)
+    across = from_centre(centres(width, height), width, height)
+    rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1)
+    return frame.depth * jnp.asarray(rays, frame.depth.dtype)
 
 
 def accumulate_light(

@@ -9,13 +9,13 @@ from jax import random
 from jflnr.flnr import paper, regression
 from jflnr.flnr.loss import relative
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.elimination import solve_strips
+from jflnr.flr.elimination import cholesky_solve
 from jflnr.flr.energy import rescale, restore
 from jflnr.flr.moments import collect, plane_count
 from jflnr.flr.noisy_guides import smooth_guide
 from jflnr.flr.parameters import Parameters
 from jflnr.flr.pyramid import double, halve
-from jflnr.flr.solve import cholesky_solve, solve
+from jflnr.flr.solve import solve, solve_strips
 from jflnr.flr.uncertainty import flr_adaptive_with_error
 from jflnr.flr.weighted_moments import collect_weighted
 from jflnr.flr.window import gather_moments, window_over

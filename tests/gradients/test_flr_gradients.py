@@ -10,10 +10,11 @@ from jax.test_util import check_grads
 
 from jflnr.flr.apply import apply
 from jflnr.flr.blur import blur, gaussian_taps
+from jflnr.flr.elimination import block_inverse_solve, cholesky_solve
 from jflnr.flr.moments import collect
 from jflnr.flr.parameters import Parameters
 from jflnr.flr.regression import flr
-from jflnr.flr.solve import block_inverse_solve, cholesky_solve, solve
+from jflnr.flr.solve import solve
 
 PARAMETERS = Parameters.of(sigma=5.0, eps=1e-2, eps_prime=1e-2)
 SHIFT = np.array([0.1, -0.2])
