@@ -50,7 +50,8 @@ def test_what_is_no_tree_is_refused(tmp_path):
         archive.writestr("header.npy", "{}")
     with pytest.raises(ValueError, match="a: not a tree"):
         arrays.read(path, "a tree")
-    np.savez(path.open("wb"), mean=TREE.mean)
+    with path.open("wb") as file:
+        np.savez(file, mean=TREE.mean)
     with pytest.raises(ValueError, match="a: not a tree"):
         arrays.read(path, "a tree")
     with pytest.raises(ValueError, match="there is no such file"):

@@ -21,9 +21,8 @@ from jflnr.flr.arguments import check_regression
 from jflnr.flr.energy import rescale, restore
 from jflnr.flr.floor import with_own_light
 from jflnr.flr.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
-from jflnr.flr.moments import Guides, centre, collect, index_xy, magnitude, planes
+from jflnr.flr.moments import Guides, centre, collect, collect_weighted, index_xy, magnitude, planes
 from jflnr.flr.pyramid import halve
-from jflnr.flr.weighted_moments import collect_weighted
 from jflnr.flr.widths import Step, fit_levels, guide_features, merged_models
 
 BLOCK = 8

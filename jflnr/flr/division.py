@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 
 def divide(x: Any, n: Any, least: Any = 0) -> jax.Array:
-    """`x / n`, arrays or numbers, where n is above `least`, else 0; x does not matter there, unless it is not finite.
+    """`x / n`, where n is above `least`, else 0.
 
     Both branches of a `where` are differentiated, so n is 1 in the one that is not taken.
     """

@@ -33,6 +33,8 @@ def eliminate(matrix: jax.Array, right: jax.Array) -> jax.Array:
     matrix: `(Q, Q, ...)`. right: `(Q, C, ...)`. Returns `(Q, C, ...)`.
     """
     count = matrix.shape[0]
+    if not count:
+        return right
     number = jnp.arange(count).reshape(-1, *(1,) * (matrix.ndim - 2))
 
     def step(k: jax.Array, system: jax.Array) -> jax.Array:
@@ -55,7 +57,7 @@ class Factored(NamedTuple):
 
 
 def factor(matrix: jax.Array, right: jax.Array) -> Factored:
-    """The first half of `cholesky_solve`, in a loop; arguments as there."""
+    """The first half of `cholesky_solve`, in a loop; arguments as there, Q > 0."""
     count = matrix.shape[0]
     number = jnp.arange(count)[:, None, None]
 

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/weighted_moments.cl; its twin in JAX is jflnr/flr/weighted_moments.py."""
+"""Host side of kernels_cl/weighted_moments.cl; its twin in JAX is in jflnr/flr/moments.py."""
 
 from __future__ import annotations
 

@@ -16,8 +16,7 @@ from jflnr.flr.adaptive import light_of
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
 from jflnr.flr.apply import apply
 from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict, windowed
-from jflnr.flr.moments import Guides, centre, collect
-from jflnr.flr.weighted_moments import collect_weighted
+from jflnr.flr.moments import Guides, centre, collect, collect_weighted
 from jflnr.flr.widths import guide_features
 from jflnr.flr.window import gather
 

@@ -11,13 +11,12 @@ from jflnr.flnr.loss import relative
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.elimination import cholesky_solve
 from jflnr.flr.energy import rescale, restore
-from jflnr.flr.moments import collect, plane_count
+from jflnr.flr.moments import collect, collect_weighted, plane_count
 from jflnr.flr.noisy_guides import smooth_guide
 from jflnr.flr.parameters import Parameters
 from jflnr.flr.pyramid import double, halve
 from jflnr.flr.solve import solve, solve_strips
 from jflnr.flr.uncertainty import flr_adaptive_with_error
-from jflnr.flr.weighted_moments import collect_weighted
 from jflnr.flr.window import gather_moments, window_over
 from jflnr.frame import Frame, composite
 from jflnr.selection import nested
