@@ -40,9 +40,9 @@ def _rendered(path: Path, counts: tuple[int, ...], realisations: int) -> dict[st
 
         backend.start()
         from experiments.render import frame
-        from experiments.render.camera import Camera
         from experiments.render.source import load
         from experiments.render.tracer import Tracer
+        from jflnr.camera import Camera
         from jflnr.files import replacing
 
         facts = jflnr.read_header(path)

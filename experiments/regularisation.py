@@ -17,9 +17,10 @@ from jflnr import guides
 from jflnr.denoising import BLOCK
 from jflnr.regression.apply import apply
 from jflnr.regression.blur import blur
+from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.moments import collect, index_xx, index_xy
 from jflnr.regression.parameters import DEFAULT, Parameters
-from jflnr.regression.solve import cholesky_solve, solve
+from jflnr.regression.solve import solve
 
 NAME = "regularisation"
 QUESTION = "How do accuracy and stability depend on eps and eps', and is Tikhonov as good?"

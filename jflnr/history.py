@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
-from jflnr.files import replacing
+from jflnr import arrays
 
-FORMAT = "jflnr-history"
+FORMAT = "jflnr history"
+WANTED = "a history that --history wrote"
 
 
 class History(NamedTuple):
@@ -20,40 +19,30 @@ class History(NamedTuple):
 
     path: Path
     about: dict[str, Any]
-    arrays: list[np.ndarray]
+    arrays: dict[str, np.ndarray]
 
     def state(self, like: Any) -> Any:
         """The state, a pytree with the structure of `like`, which may be of another moment.
 
         Raises `ValueError` if it is of another method or of frames of another size.
         """
-        leaves, structure = jax.tree.flatten(like)
-        wanted, found = ([np.shape(leaf) for leaf in some] for some in (leaves, self.arrays))
-        if wanted != found:
+        try:
+            return arrays.restore(self.arrays, like)
+        except ValueError as error:
             raise ValueError(
-                f"{self.path} is of frames of another size or with other layers than this one"
-            )
-        arrays = zip(self.arrays, leaves, strict=True)
-        return jax.tree.unflatten(structure, [a.astype(leaf.dtype) for a, leaf in arrays])
+                f"{self.path} is of frames of another size or with other layers than this one: "
+                f"{error}"
+            ) from None
 
 
 def read(path: Path) -> History:
-    """The history in a file. Raises `OSError` and, if it is no such file, `ValueError`."""
-    with path.open("rb") as file:
-        try:
-            with np.load(file, allow_pickle=False) as stored:
-                about = json.loads(str(stored[FORMAT]))
-                arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
-        except Exception:  # damaged archives fail in many ways, some undocumented
-            raise ValueError(
-                f"{path} is not a history that --history wrote, or is damaged"
-            ) from None
-    return History(path, about, arrays)
+    """The history in a file. Raises `ValueError` if it is no such file."""
+    header, stored = arrays.read(path, WANTED)
+    if header.get("format") != FORMAT or not isinstance(header.get("about"), dict):
+        raise ValueError(f"{path}: not {WANTED}")
+    return History(path, header["about"], stored)
 
 
 def write(path: Path, state: Any, about: Mapping[str, Any]) -> None:
     """Write a state, atomically. about: what JSON can hold."""
-    stored: dict[str, Any] = {FORMAT: np.array(json.dumps(about))}
-    stored |= {f"array{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
-    with replacing(path) as beside, beside.open("wb") as file:
-        np.savez(file, **stored)
+    arrays.write(path, {"format": FORMAT, "about": dict(about)}, state)

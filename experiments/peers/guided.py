@@ -14,9 +14,9 @@ import jax
 import jax.numpy as jnp
 
 from experiments.peers.windows import box
-from jflnr.regression.solve import cholesky_solve
 from jflnr.frame import Array, Frame
-from jflnr.guides import layers, shrink
+from jflnr.images.guides import layers, shrink
+from jflnr.regression.elimination import cholesky_solve
 
 PAPER: dict[str, Any] = {"guides": ("normal", "depth"), "radius": 24, "eps": 0.01}
 FAST_PAPER: dict[str, Any] = PAPER | {"subsample": 4, "average": False}

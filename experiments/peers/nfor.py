@@ -16,9 +16,9 @@ import jax
 import jax.numpy as jnp
 
 from experiments.peers.windows import box, over_offsets, square
-from jflnr.regression.solve import cholesky_solve
 from jflnr.frame import Array, Frame
-from jflnr.guides import layers
+from jflnr.images.guides import layers
+from jflnr.regression.elimination import cholesky_solve
 
 PAPER: dict[str, Any] = {
     "guides": ("normal", "depth", "ao"),

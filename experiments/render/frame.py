@@ -12,10 +12,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.render.camera import Camera
 from experiments.render.reference import Accumulator, Goal
 from experiments.render.sampling import stream_seed
 from experiments.render.tracer import Tracer
+from jflnr.camera import Camera
 from jflnr.exr import layers_of, read_attributes, read_channels, write_channels
 
 AXES = {"normal": "XYZ", "position": "XYZ", "depth": "Z", "ao": "Y", "mask": "Y", "motion": "XY"}

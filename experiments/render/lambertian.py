@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.render.camera import Camera
+from jflnr.camera import Camera
 
 Element = ElementTree.Element
 COLOURS = ("reflectance", "diffuse_reflectance", "base_color", "specular_reflectance")

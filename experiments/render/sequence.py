@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.render import frame
-from experiments.render.camera import Camera
+from experiments.render.camera import looking
 from experiments.render.lambertian import load_xml
 from experiments.render.sampling import stream_seed
 from experiments.render.scene import build
@@ -20,6 +20,7 @@ from experiments.render.tracer import Tracer
 from experiments.scenes.geometry import Array, rotation, sphere
 from experiments.scenes.textures import checks, limited
 from experiments.scenes.world import Ball, Material, World
+from jflnr.camera import Camera, centres
 
 MOVER = "mover"
 BALL = 0.06  # radius of the moving object, as a share of the distance that is looked at
@@ -91,8 +92,7 @@ class Shot:
         height, width = tracer.height, tracer.width
         if number == 0:
             return np.zeros((height, width, 2))
-        y, x = np.mgrid[:height, :width] + 0.5
-        here = np.stack([x, y], -1)
+        here = centres(width, height)
         depth = tracer.guides["depth"][..., 0].astype(float)
         far = np.where(depth > 0, depth, 1e6)
         points = self.camera(number).points(here, far, width, height)
@@ -141,7 +141,7 @@ def along_path(camera: Camera, ahead: float, t: float) -> Camera:
     target = eye + ahead * forward
     side = 0.12 * ahead * np.sin(0.5 * np.pi * t)
     moved = eye + side * left + 0.08 * ahead * t * forward + 0.02 * ahead * np.sin(np.pi * t) * up
-    return Camera.looking(moved, target, camera.fov_x, up)
+    return looking(moved, target, camera.fov_x, up)
 
 
 def with_light(world: World, t: float) -> World:

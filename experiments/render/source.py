@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from experiments.render import views
-from experiments.render.camera import Camera
 from experiments.render.lambertian import load_xml
 from experiments.render.sampling import stream_seed
 from experiments.render.scene import build
@@ -19,6 +18,7 @@ from experiments.render.splits import split_of
 from experiments.render.tracer import Tracer
 from experiments.scenes.catalogue import world_of
 from experiments.scenes.world import World
+from jflnr.camera import Camera
 from jflnr.exr import read_attributes
 
 RANDOM = 100  # views from here on are random ones; those below are a scene's own

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.render import transport
-from experiments.render.camera import Camera
+from experiments.render.camera import slopes
 from experiments.render.guide import Guide
 from experiments.render.sampling import Independent, Stratified
+from jflnr.camera import Camera
 
 Image = NDArray[np.float32]
 
@@ -152,7 +153,7 @@ def _primary_ray(camera: Camera, width: int, height: int, lane: Any) -> Any:
     columns = dr.opaque(mi.UInt32, width)
     y = lane // columns
     x = lane - y * columns
-    slope_x, slope_y = (dr.opaque(mi.Float, s) for s in camera.slopes(width, height))
+    slope_x, slope_y = (dr.opaque(mi.Float, s) for s in slopes(camera, width, height))
     sx, sy = dr.opaque(mi.Float, 2 / width), dr.opaque(mi.Float, 2 / height)
     local = mi.Vector3f(
         (1 - (mi.Float(x) + 0.5) * sx) * slope_x, (1 - (mi.Float(y) + 0.5) * sy) * slope_y, 1

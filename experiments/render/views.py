@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.render.camera import Camera
+from experiments.render.camera import looking
 from experiments.render.tracer import Tracer
 from experiments.scenes.world import World
+from jflnr.camera import Camera
 
 TRIES = 60
 CHOICE = 3  # of so many valid views, the one with most to see is taken
@@ -20,7 +21,7 @@ PROBE = (64, 36)
 def camera_of(world: World) -> Camera | None:
     """The view that a world names for itself."""
     view = world.view
-    return Camera.looking(view.origin, view.target, view.fov_x) if view else None
+    return looking(view.origin, view.target, view.fov_x) if view else None
 
 
 def random_views(
@@ -54,7 +55,7 @@ def of_world(world: World, rng: np.random.Generator) -> Iterator[Camera]:
         target = target + rng.normal(size=3) * 0.15
         away = target - eye
         if np.linalg.norm(away) > 0.5 and np.hypot(away[0], away[2]) > 0.35 * np.linalg.norm(away):
-            yield Camera.looking(eye, target, rng.uniform(*world.fov_x))
+            yield looking(eye, target, rng.uniform(*world.fov_x))
 
 
 def of_scene(scene: Any, home: Camera, rng: np.random.Generator) -> Iterator[Camera]:
@@ -74,7 +75,7 @@ def of_scene(scene: Any, home: Camera, rng: np.random.Generator) -> Iterator[Cam
         eye = start.to_world[:3, 3]
         eye = eye + rng.uniform(0, 0.6) * (goal - eye) * (1 - 0.8 * np.abs(up))
         if abs(np.dot(target - eye, up)) < 0.5 * np.linalg.norm(target - eye):
-            camera = Camera.looking(eye, target, home.fov_x * rng.uniform(0.8, 1.05), up)
+            camera = looking(eye, target, home.fov_x * rng.uniform(0.8, 1.05), up)
             if len(places) < 8:
                 places.append(camera)
             yield camera

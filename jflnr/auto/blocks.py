@@ -23,11 +23,11 @@ from jflnr.auto.weights import weigh, weighted
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, mean_light
 from jflnr.regression.energy import restore
 from jflnr.regression.level import Fit, Grid, mean_guides, predict, windowed
-from jflnr.regression.merge import interpolate, signal_share
 from jflnr.regression.moments import index_xx, index_xy
 from jflnr.regression.pyramid import double, halve
-from jflnr.regression.uncertainty import DETAIL, LEFT_OUT, VARIANCE
-from jflnr.regression.widths import guide_features
+from jflnr.regression.uncertainty import DETAIL, Error
+from jflnr.regression.widths import Known, guide_features
+from jflnr.regression.widths import refine as refine_grid
 from jflnr.regression.window import gather, window_over
 
 # Side in pixels of the coarsest blocks.
@@ -69,8 +69,8 @@ class Models(NamedTuple):
 class Progress(NamedTuple):
     """How far a frame's fit has come, from coarse grids to finer ones.
 
-    fit: by itself, of the last grid. merged: the models put together so far. variance, left_out:
-    parts of the expected squared error. The rest as in `Models`.
+    fit: by itself, of the last grid. merged: the models put together so far. The rest as in
+    `Models`.
     """
 
     mean: jax.Array
@@ -79,8 +79,7 @@ class Progress(NamedTuple):
     order: jax.Array
     width: jax.Array
     level: jax.Array
-    variance: jax.Array
-    left_out: jax.Array
+    error: Error
     share: jax.Array
 
 
@@ -104,10 +103,7 @@ def fit(collected: Collected, groups: tuple[int, ...], block: int) -> tuple[Mode
     mean = mean_light(jnp.sum(light[0]), jnp.sum(light[index_xy(0, 0, collected.shift.size, 1)]))
     weights, squares = weigh(collected, light, mean, block, numbers)
     finest = weighted(collected, weights, squares, block)
-    grids = [finest]
-    while grids[-1].block < COARSEST:
-        last = grids[-1]
-        grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+    grids = finest.pyramid((COARSEST // block).bit_length())
     progress = _widest(grids.pop(), collected, groups, mean, numbers)
     for number, grid in enumerate(reversed(grids[1:]), 1):
         progress = _refined(progress, grid, number, collected, groups, numbers)
@@ -140,8 +136,7 @@ def _models(
     coefficients = restore(progress.merged, light, count, numbers.slack)
     moments = collected.moments[: index_xy(0, 0, count, 0)]
     done = inside(coefficients, moments, groups)
-    error = VARIANCE * progress.variance + LEFT_OUT * progress.left_out
-    error += DETAIL * progress.level**2 + INSIDE * jnp.sum(done, axis=0)
+    error = progress.error.square() + DETAIL * progress.level**2 + INSIDE * jnp.sum(done, axis=0)
     return Models(
         coefficients=coefficients,
         means=mean_guides(moments, count),
@@ -170,7 +165,7 @@ def _widest(
     level = predict(fit.coefficients, mean_guides(grid.moments, count))
     zero, one = jnp.zeros_like(order), jnp.ones_like(order)
     merged = fit.coefficients
-    return Progress(mean, fit, merged, order, zero, level, fit.variance, zero, one)
+    return Progress(mean, fit, merged, order, zero, level, Error.of(fit), one)
 
 
 def _refined(
@@ -187,41 +182,33 @@ def _refined(
     number: of halvings so far. shifted: let the models be the coarser ones, shifted, which costs
     little.
     """
-    size, count = grid.moments.shape[1:], collected.shift.size
-    coarse = interpolate(last.fit, *size)
-    merged, order, width, variance, left_out = (
-        double(planes, *size)
-        for planes in (last.merged, last.order, last.width, last.variance, last.left_out)
-    )
-    regressors = mean_guides(grid.moments, count)
-    level = jnp.maximum(predict(merged, regressors), 0)
-    # Windows end where what is known so far of the brightness changes.
-    edge = numbers.brightness_scale * jnp.log(level / last.mean + 0.1)
-    features = jnp.concatenate([guide_features(grid, count, numbers), edge[None]])
-    if shifted:
-        fine, fine_order = _shift_grid(grid, features, coarse, collected, numbers), order
-    else:
+    size, count, mean = grid.moments.shape[1:], collected.shift.size, last.mean
+    order, width = (double(planes, *size) for planes in (last.order, last.width))
+    found = [order]
+
+    def own_fit(known: Known) -> Fit:
+        if shifted:
+            return _shift_grid(grid, known, collected, numbers)
         slopes = grid.block >= SLOPES
-        fine, fine_order = _fit_grid(grid, features, collected, groups, last.mean, numbers, slopes)
-    reference = level**2 + 0.01 * last.mean**2
-    share = signal_share(grid, fine, coarse, last.fit.window, reference, numbers.caution)
-    change = fine.coefficients - coarse.coefficients
-    return last._replace(
-        fit=fine,
-        merged=merged + share * change,
-        order=order + share * (fine_order - order),
-        width=width + share * (number - width),
-        level=level,
-        variance=variance + share * jnp.maximum(fine.variance - coarse.variance, 0),
-        left_out=left_out + ((1 - share) * predict(change, regressors)) ** 2,
-        share=share,
+        fine, found[0] = _fit_grid(grid, known.features, collected, groups, mean, numbers, slopes)
+        return fine
+
+    step = refine_grid(grid, last.fit, last.merged, count, mean, numbers, own_fit)
+    return Progress(
+        mean=mean,
+        fit=step.fine,
+        merged=step.merged,
+        order=order + step.share * (found[0] - order),
+        width=width + step.share * (number - width),
+        level=step.level,
+        error=last.error.after(step),
+        share=step.share,
     )
 
 
 def _shift_grid(
     grid: Grid,
-    features: jax.Array,
-    coarse: Fit,
+    known: Known,
     collected: Collected,
     numbers: AdaptiveFLR,
 ) -> Fit:
@@ -230,7 +217,7 @@ def _shift_grid(
     Sums of a few planes instead of moments and a solve.
     """
     count, channels = collected.shift.size, collected.channels
-    window = window_over(features, numbers.sigma)
+    window, coarse = window_over(known.features, numbers.sigma), known.coarse
     sums = grid.moments[np.array([index_xx(i, 0) for i in range(count + 1)])]
     light = grid.moments[index_xy(0, 0, count, channels) :][:channels]
     left = light - jnp.einsum("qchw,qhw->chw", coarse.coefficients, sums)

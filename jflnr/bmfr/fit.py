@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr.frame import Array
+from jflnr.regression.division import divide
 from jflnr.regression.moments import magnitude
 
 # Displacements of the grid, in blocks: a sequence of 16 (section 6.1), here spread evenly.
@@ -98,10 +99,8 @@ def scaled_features(features: jax.Array, surface: jax.Array, squares: int) -> ja
         t, least = t / 2, least / 2
         low = jnp.min(jnp.where(surface, t, jnp.inf), axis=1, keepdims=True)
         high = jnp.max(jnp.where(surface, t, -jnp.inf), axis=1, keepdims=True)
-        varies = high - low > least
-        return jnp.where(
-            surface & varies, 2 * ((t - low) / jnp.where(varies, high - low, 1)) - 1, 0
-        )
+        varies = surface & (high - low > least)
+        return jnp.where(varies, 2 * divide(t - low, high - low, least) - 1, 0)
 
     t = to_unit(features, 0)
     squared = to_unit(t[..., t.shape[-1] - squares :] ** 2, FLAT)

@@ -12,12 +12,15 @@ from typing import ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jflnr import checks
 from jflnr.bmfr.fit import fit, grid_offset
 from jflnr.bmfr.taa import smooth
+from jflnr.camera import centres, from_centre
 from jflnr.frame import Array, Frame
 from jflnr.regression.arguments import check_options
+from jflnr.regression.division import divide
 from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
 
 # Below this albedo the light cannot be told from the picture.
@@ -119,7 +122,7 @@ def step(history: History, frame: Frame, method: BMFR = PAPER) -> tuple[History,
     known = history.samples > 0
     picture = smooth(frame.albedo * fitted, history.picture, known, moved, method.picture_share)
     bright = inside & (frame.albedo > DARK)
-    image = jnp.where(bright, picture / jnp.where(bright, frame.albedo, 1), fitted)
+    image = jnp.where(bright, divide(picture, frame.albedo, DARK), fitted)
     # A pixel without a sample so far has nothing to hand on.
     surface = Surface.of(frame)._replace(depth=jnp.where(count > 0, frame.depth, 0))
     return History(history.number + 1, surface, count, light, fitted, picture), image
@@ -156,8 +159,9 @@ def position(frame: Frame) -> Array:
     if frame.position is not None:
         return frame.position
     height, width = frame.depth.shape[:2]
-    y, x = jnp.mgrid[:height, :width] + 0.5
-    return frame.depth * jnp.stack([x - width / 2, y - height / 2, jnp.ones_like(x)], axis=-1)
+    across = from_centre(centres(width, height), width, height)
+    rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1)
+    return frame.depth * jnp.asarray(rays, frame.depth.dtype)
 
 
 def accumulate_light(

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jax.scipy.ndimage import map_coordinates
 
 from jflnr.frame import Array
+from jflnr.regression.division import divide
 
 # Luma, orange and green of a colour; halves and quarters, so that the way back loses nothing.
 YCOCG = ((0.25, 0.5, 0.25), (0.5, 0.0, -0.5), (-0.25, 0.5, -0.25))
@@ -33,7 +34,7 @@ def smooth(
     counted = jnp.concatenate([jnp.where(known, before, 0), known], axis=-1)
     *sums, weight = (read(counted[..., c]) for c in range(4))
     was_there &= weight[..., None] > 0
-    history = jnp.stack(sums, axis=-1) / jnp.where(was_there, weight[..., None], 1)
+    history = divide(jnp.stack(sums, axis=-1), weight[..., None])
     colour = jnp.asarray(picture) @ jnp.array(YCOCG).T
     history = jnp.clip(history @ jnp.array(YCOCG).T, *neighbourhood(colour))
     mixed = history + share * (colour - history)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from jflnr.camera import Camera
 from jflnr.exr import Window
-from jflnr.layouts.camera import Camera
+from jflnr.layouts.camera import camera_of, depth_of, position_of
 from jflnr.layouts.channels import LAYERS, NATIVE, layer
 from jflnr.layouts.light import DARK, demodulate, rest
 from jflnr.layouts.source import Source
@@ -32,7 +33,7 @@ def assemble(source: Source) -> Layers:
         return layer(channels, name, names[name], str(source.path), advice, source.part)
 
     # Others write worldToCamera too, transposed or looking another way.
-    camera = Camera.of(source.attributes.others if layout.program == "pbrt" else source.header)
+    camera = camera_of(source.attributes.others if layout.program == "pbrt" else source.header)
     needed = {layout.light, *GUIDES}
     if camera is not None and "position" in there and "depth" not in there:
         needed.remove("depth")
@@ -51,9 +52,9 @@ def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
     """Depth or position, if it is absent."""
     position, depth, normal = images["position"], images["depth"], images["normal"]
     if depth is None and position is not None and normal is not None:
-        return {"depth": camera.depth(position, (normal != 0).any(axis=-1, keepdims=True))}
+        return {"depth": depth_of(camera, position, (normal != 0).any(axis=-1, keepdims=True))}
     if position is None and depth is not None and camera.fov_x is not None:
-        return {"position": camera.position(depth, window)}
+        return {"position": position_of(camera, depth, window)}
     return {}
 
 

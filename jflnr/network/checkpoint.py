@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-import jax
-import numpy as np
-
-from jflnr.files import replacing
+from jflnr import arrays
 
 
 def save_state(path: Path, state: Any, history: list, run: dict[str, Any]) -> None:
-    """Write the leaves of `state`, the history and what identifies the run, atomically."""
-    header = json.dumps({"run": run, "history": history}).encode()
-    leaves: dict[str, Any] = {
-        f"leaf{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))
-    }
-    with replacing(path) as beside, beside.open("wb") as file:
-        np.savez(file, header=np.frombuffer(header, np.uint8), **leaves)
+    """Write the state, the history and what identifies the run, atomically."""
+    arrays.write(path, {"run": run, "history": history}, state)
 
 
 def load_state(path: Path, like: Any, run: dict[str, Any]) -> tuple[Any, list]:
@@ -27,15 +18,13 @@ def load_state(path: Path, like: Any, run: dict[str, Any]) -> tuple[Any, list]:
 
     Raises `ValueError` if the file is no state, or one of another run.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            header = json.loads(file["header"].tobytes())
-            leaves = [file[f"leaf{i}"] for i in range(len(file.files) - 1)]
-    except (OSError, ValueError, KeyError) as error:
-        raise ValueError(f"{path}: not the state of a training run ({error})") from None
-    if header["run"] != run:
+    header, stored = arrays.read(path, "the state of a training run")
+    if header.get("run") != run:
         raise ValueError(
-            f"{path}: the state of another run ({header['run']}); this one is {run}. "
+            f"{path}: the state of another run ({header.get('run')}); this one is {run}. "
             "Remove the file to begin anew"
         )
-    return jax.tree.unflatten(jax.tree.structure(like), leaves), header["history"]
+    try:
+        return arrays.restore(stored, like), header["history"]
+    except (ValueError, KeyError) as error:
+        raise ValueError(f"{path}: not the state of this training run ({error})") from None

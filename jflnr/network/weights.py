@@ -7,8 +7,6 @@ network needs is refused.
 from __future__ import annotations
 
 import functools
-import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +14,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jflnr.files import replacing
+from jflnr import arrays
 from jflnr.network import features, flnr, unet
 
 FORMAT, VERSION = "jflnr network", 2
 # More than any network here has; a file that says it unpacks to more is not read.
 LARGEST = 64 * 2**20
+WANTED = "a file of weights that `jflnr train` wrote"
 FOLDER = Path(__file__).parent / "weights"
 
 
@@ -35,28 +34,22 @@ def save(path: str | Path, params: unet.Params, widths: tuple[int, ...], **about
         "features": features.COUNT,
         **about,
     }
-    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    arrays: dict[str, Any] = {name: np.asarray(value, np.float16) for name, value in params.items()}
-    with replacing(path) as beside, beside.open("wb") as file:
-        np.savez_compressed(file, header=text, **arrays)
+    half = {name: np.asarray(value, np.float16) for name, value in params.items()}
+    arrays.write(path, header, half, compress=True)
 
 
 def load(path: str | Path) -> tuple[unet.Params, dict[str, Any]]:
     """Weights in float32, and the header; `ValueError` in one sentence if it is no such file."""
-    arrays = _arrays(Path(path))
-    header = _header(path, arrays.pop("header", None))
-    wanted = _shapes(tuple(header["widths"]))
-    found = {name: array.shape for name, array in arrays.items()}
-    if found != wanted:
-        odd = sorted(name for name in found | wanted if found.get(name) != wanted.get(name))[0]
-        raise ValueError(
-            f"{path}: array {odd} has shape {found.get(odd)} and the network of widths "
-            f"{header['widths']} needs {wanted.get(odd)}"
-        )
-    for name, array in arrays.items():
+    header, stored = arrays.read(path, WANTED, LARGEST)
+    widths = _widths(path, header)
+    for name, array in stored.items():
         if array.dtype != np.float16 or not np.isfinite(array).all():
             raise ValueError(f"{path}: array {name} must hold finite half-precision numbers")
-    return {name: jnp.asarray(array, jnp.float32) for name, array in arrays.items()}, header
+    like = jax.eval_shape(lambda key: flnr.init(key, widths), jax.random.key(0))
+    try:
+        return jax.tree.map(jnp.asarray, arrays.restore(stored, like)), header
+    except ValueError as error:
+        raise ValueError(f"{path}: {error} in the network of widths {list(widths)}") from None
 
 
 @functools.cache
@@ -65,30 +58,10 @@ def shipped(method: str) -> unet.Params:
     return load(FOLDER / f"{method}.npz")[0]
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    wanted = "it should be a file of weights that `jflnr train` wrote"
-    if not path.exists():
-        raise ValueError(f"{path}: there is no such file; {wanted}")
-    with path.open("rb") as file:
-        try:
-            with zipfile.ZipFile(file) as archive:
-                size = sum(entry.file_size for entry in archive.infolist())
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as stored:
-                if size <= LARGEST:
-                    return {name: stored[name] for name in stored.files}
-        except Exception:  # damaged archives fail in many ways, some undocumented
-            raise ValueError(f"{path}: cannot be read, or is damaged; {wanted}") from None
-    raise ValueError(f"{path}: unpacks to more than any network here needs; {wanted}")
-
-
-def _header(path: str | Path, text: np.ndarray | None) -> dict[str, Any]:
-    try:
-        header = json.loads(b"" if text is None else text.tobytes())
-    except (ValueError, RecursionError):
-        header = None
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ValueError(f"{path}: not a file of weights that `jflnr train` wrote")
+def _widths(path: str | Path, header: dict[str, Any]) -> tuple[int, ...]:
+    """Those of a header that this version reads."""
+    if header.get("format") != FORMAT:
+        raise ValueError(f"{path}: not {WANTED}")
     for name, wanted in (("version", VERSION), ("features", features.COUNT)):
         if header.get(name) != wanted:
             raise ValueError(
@@ -101,9 +74,4 @@ def _header(path: str | Path, text: np.ndarray | None) -> dict[str, Any]:
         or not all(type(width) is int and 0 < width <= 512 for width in widths)
     ):
         raise ValueError(f"{path}: widths is {widths!r}; it must be two to eight positive integers")
-    return header
-
-
-def _shapes(widths: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
-    params = jax.eval_shape(lambda key: flnr.init(key, widths), jax.random.key(0))
-    return {name: value.shape for name, value in params.items()}
+    return tuple(widths)

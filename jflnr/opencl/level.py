@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from jflnr.opencl.grids import Grid, Run
-from jflnr.regression.elimination import ROUNDING
 from jflnr.regression.moments import plane_count
+from jflnr.regression.solve import ROUNDING_OF_STRIPS as ROUNDING
 
 
 class Alike(NamedTuple):

@@ -46,7 +46,7 @@ def _vectors(context: Context) -> int:
 
 
 def apply(context: Context, params: unet.Params, x: Maps) -> list[Maps]:
-    """The outputs of every scale that has a head, fine to coarse; the twin is `network.unet.apply`."""
+    """The outputs of every scale that has a head, fine to coarse."""
     arrays = {name: np.asarray(value, np.float32) for name, value in params.items()}
     widths = [arrays[name].shape[-1] for name in sorted(arrays) if name[:-1] == "encode"]
     x = convolve(context, arrays, "stem", x)

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/weighted_moments.cl; the twin is jflnr/regression/weighted_moments.py."""
+"""Host side of kernels_cl/weighted_moments.cl; the twin is in jflnr/regression/moments.py."""
 
 from __future__ import annotations
 

@@ -28,13 +28,13 @@ from jflnr.regression.moments import (
     centre,
     channels_of,
     collect,
+    collect_weighted,
     index_xy,
     magnitude,
     planes,
 )
 from jflnr.regression.pyramid import halve
 from jflnr.regression.uncertainty import DETAIL, block_error
-from jflnr.regression.weighted_moments import collect_weighted
 from jflnr.regression.widths import Step, fit_levels, guide_features, merged_models
 from jflnr.regression.window import REACH
 from jflnr.stages import Known, Parts, Stage, regress
@@ -256,7 +256,7 @@ def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     levels = fit_steps(method, grid, known)
     given = merged_parts(*levels, parts["light"], grid, known)
     if method.with_error:
-        given["error"] = block_error(*levels, known["shift"].size)
+        given["error"] = block_error(*levels)
     return given
 
 

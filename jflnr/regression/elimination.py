@@ -1,120 +1,149 @@
-"""The regularised least squares of `solve.py` for many blocks: strip by strip, by elimination.
+"""Solvers of many small symmetric systems at once, each with a diagonal near 1.
 
-The same equations (Appendix, Eq. 12-23) with regularisation that differs from block to block. A few
-rows of blocks at a time stay in the cache, and Gauss-Jordan elimination is one short loop, which
-compiles in a fraction of the time that a factorisation written out takes.
+No search for pivots is needed. A pivot no larger than the rounding error belongs to a guide that
+the ones before it already explain: that guide's slope is 0.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import lax
 
-from jflnr.regression.moments import index_xx, index_xy
+from jflnr.regression.division import divide
 
-# Roundings of a sum of squares that may add up.
-ROUNDING = 64
-# Blocks that are solved at a time.
-STRIP = 4096
+Solver = Literal["cholesky", "block-inverse"]
+# Roundings that a pivot may be off by.
+ROUNDING = 8
+# So many guides are solved step by step as written out; of more, that compiles for minutes.
+WRITTEN_OUT = 8
 
 
-def solve_strips(
-    moments: jax.Array, shift: jax.Array, eps: jax.Array, eps_prime: jax.Array, channels: int
-) -> jax.Array:
-    """Coefficients of the local affine models, as from `solve`.
+def inverse_pivot(pivot: jax.Array) -> jax.Array:
+    """One over a pivot, 0 if it is no larger than the rounding error."""
+    return divide(1, pivot, ROUNDING * jnp.finfo(pivot.dtype).eps)
 
-    moments: `(K, h, w)`. shift: `(Q,)`. eps, eps_prime: `(h, w)`, multiplicative and additive
-    regularisation. channels: the number C of target channels. Returns `(Q + 1, C, h, w)`.
+
+def eliminate(matrix: jax.Array, right: jax.Array) -> jax.Array:
+    """Solve `matrix @ a = right` by Gauss-Jordan elimination: one short loop, which compiles fast.
+
+    matrix: `(Q, Q, ...)`. right: `(Q, C, ...)`. Returns `(Q, C, ...)`.
     """
-    height, width = moments.shape[1:]
-    rows = min(max(STRIP // width, 1), height)
-    regular = jnp.stack([eps, eps_prime])
-
-    def solve_some(strip: jax.Array, models: jax.Array) -> jax.Array:
-        # The last strip ends with the grid; what it shares with the one before is the same.
-        first = jnp.minimum(strip * rows, height - rows)
-        some, own = (lax.dynamic_slice_in_dim(a, first, rows, axis=1) for a in (moments, regular))
-        some, own = lax.optimization_barrier((some, own))
-        solved = _solve(some, own, shift, channels)
-        return lax.dynamic_update_slice_in_dim(models, solved, first, axis=2)
-
-    models = jnp.zeros((shift.size + 1, channels, height, width), moments.dtype)
-    return lax.fori_loop(0, -(-height // rows), solve_some, models)
-
-
-def _solve(moments: jax.Array, regular: jax.Array, shift: jax.Array, channels: int) -> jax.Array:
-    system = normal_equations(moments, shift, regular[0], regular[1], channels)
-    if not shift.size:
-        return system.mean_y[None]
-    both = jnp.concatenate([system.correlation, system.right], axis=1)
-    slopes = eliminate(both) * system.scale[:, None]
-    value = system.mean_y - jnp.sum(system.mean_x[:, None] * slopes, axis=0)
-    return jnp.concatenate([value[None], slopes])
-
-
-class NormalEquations(NamedTuple):
-    """`correlation @ (slopes / scale) = right`, and the means that the models pass through.
-
-    correlation: `(Q, Q, h, w)`. right: `(Q, C, h, w)`. scale, mean_x: `(Q, h, w)`. mean_y:
-    `(C, h, w)`.
-    """
-
-    correlation: jax.Array
-    right: jax.Array
-    scale: jax.Array
-    mean_x: jax.Array
-    mean_y: jax.Array
-
-
-def normal_equations(
-    moments: jax.Array, shift: jax.Array, eps: jax.Array, eps_prime: jax.Array, channels: int
-) -> NormalEquations:
-    """Eq. 13 to 22; arguments as of `solve_strips`."""
-    count = shift.size
-    filled = moments[0] > 1e-12
-    means = moments * jnp.where(filled, 1 / jnp.where(filled, moments[0], 1), 0)
-    xx = (count + 1) * (count + 2) // 2
-    mean_x = means[np.array([index_xx(i + 1, 0) for i in range(count)], int)]
-    mean_y = means[index_xy(0, 0, count, channels) :][:channels]
-    pairs = np.array([index_xx(i + 1, j + 1) for i, j in np.ndindex(count, count)], int)
-    diagonal = jnp.eye(count, dtype=bool)[:, :, None, None]
-    covariance = means[pairs.reshape(count, count)] - mean_x[:, None] * mean_x
-    covariance = jnp.where(diagonal, jnp.maximum(covariance, 0), covariance)
-    mu = mean_x + shift[:, None, None].astype(means.dtype)
-    outer = eps * mu[:, None] * mu
-    # Of a narrow window far from the shift, no more of the variance is known than this.
-    rounding = ROUNDING * jnp.finfo(means.dtype).eps * (covariance + mean_x[:, None] * mean_x)
-    regular = covariance + outer + jnp.where(diagonal, outer + eps_prime + rounding, 0)
-
-    scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)])) if count else mean_x
-    correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)
-    cross = means[xx + channels :].reshape(count, channels, *means.shape[1:])
-    right = (cross - mean_x[:, None] * mean_y) * scale[:, None]
-    return NormalEquations(correlation, right, scale, mean_x, mean_y)
-
-
-def eliminate(system: jax.Array) -> jax.Array:
-    """Solve `[matrix, right]`, `(Q, Q + C, ...)`, by Gauss-Jordan elimination: `(Q, C, ...)`.
-
-    The matrix is symmetric with a diagonal near 1, and needs no search for pivots.
-    A pivot no larger than the rounding error belongs to a guide that others already explain: its
-    slope is 0.
-    """
-    count = system.shape[0]
+    count = matrix.shape[0]
+    if not count:
+        return right
+    number = jnp.arange(count).reshape(-1, *(1,) * (matrix.ndim - 2))
 
     def step(k: jax.Array, system: jax.Array) -> jax.Array:
-        row = lax.dynamic_index_in_dim(system, k, 0, keepdims=False)
-        column = lax.dynamic_index_in_dim(system, k, 1, keepdims=False)
-        pivot = lax.dynamic_index_in_dim(row, k, 0, keepdims=False)
-        clear = pivot > 8 * jnp.finfo(pivot.dtype).eps
-        row = row * jnp.where(clear, 1 / jnp.where(clear, pivot, 1), 0)
-        is_row = (jnp.arange(count) == k).reshape(-1, *(1,) * pivot.ndim)
-        column = jnp.where(is_row, -1, column)
+        row, column = (lax.dynamic_index_in_dim(system, k, axis, False) for axis in (0, 1))
+        row = row * inverse_pivot(lax.dynamic_index_in_dim(row, k, 0, False))
+        is_row = number == k
         kept = jnp.where(is_row[:, None], 0, system)
-        return kept - column[:, None] * row
+        return kept - jnp.where(is_row, -1, column)[:, None] * row
 
-    return lax.fori_loop(0, count, step, system)[:, count:]
+    both = jnp.concatenate([matrix, right], axis=1)
+    return lax.fori_loop(0, count, step, both)[:, count:]
+
+
+class Factored(NamedTuple):
+    """`matrix = L D L^T`: 1 / D `(Q, h, w)`, D L^T `(Q, Q, h, w)` and L^-1 right `(Q, C, h, w)`."""
+
+    inverse: jax.Array
+    upper: jax.Array
+    right: jax.Array
+
+
+def factor(matrix: jax.Array, right: jax.Array) -> Factored:
+    """The first half of `cholesky_solve`, in a loop; arguments as there, Q > 0."""
+    count = matrix.shape[0]
+    number = jnp.arange(count)[:, None, None]
+
+    def step(k: jax.Array, state: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        system, inverses = state
+        row, column = system[k], system[:, k]
+        inverse = inverse_pivot(row[k])
+        share = jnp.where(number > k, column * inverse, 0)
+        return system - share[:, None] * row, inverses.at[k].set(inverse)
+
+    both = jnp.concatenate([matrix, right], axis=1)
+    both, inverse = lax.fori_loop(0, count, step, (both, jnp.zeros_like(matrix[:, 0])))
+    return Factored(inverse, both[:, :count], both[:, count:])
+
+
+def substitute(system: Factored, shares: jax.Array) -> jax.Array:
+    """The second half, with `shares` `(Q, h, w)` of L^-1 right. Returns `(Q, C, h, w)`."""
+    count = system.inverse.shape[0]
+    later = jnp.arange(count)[:, None, None]
+
+    def step(i: jax.Array, solution: jax.Array) -> jax.Array:
+        k = count - 1 - i
+        row = jnp.where(later > k, system.upper[k], 0)
+        known = jnp.sum(row[:, None] * solution, axis=0)
+        return solution.at[k].set((shares[k] * system.right[k] - known) * system.inverse[k])
+
+    return lax.fori_loop(0, count, step, jnp.zeros_like(system.right))
+
+
+def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
+    """Solve `matrix @ a = right` by Cholesky in its root-free form, `matrix = L D L^T`.
+
+    Above `WRITTEN_OUT` guides by elimination, which has the same pivots, in a loop.
+    matrix: `(Q, Q, h, w)`, symmetric with a diagonal near 1. right: `(Q, C, h, w)`.
+    Returns `(Q, C, h, w)`.
+    """
+    if matrix.shape[0] > WRITTEN_OUT:
+        return eliminate(matrix, right)
+    steps = []
+    while matrix.shape[0]:
+        pivot, row, first = matrix[0, 0], matrix[0, 1:], right[0]
+        inverse = inverse_pivot(pivot)
+        steps.append((inverse, row, first))
+        factor = row * inverse
+        matrix = matrix[1:, 1:] - factor[:, None] * row
+        right = right[1:] - factor[:, None] * first
+    solution = right
+    for inverse, row, first in reversed(steps):
+        known = jnp.sum(row[:, None] * solution, axis=0)
+        solution = jnp.concatenate([((first - known) * inverse)[None], solution])
+    return solution
+
+
+def block_inverse_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
+    """Solve by the paper's recursive block-matrix inverse (Appendix, first formula).
+
+    Of guides alike the products nearly cancel, each far above their sum: so they are of numbers
+    near 1, also where the light is near the type's maximum.
+    """
+    largest = jnp.max(jnp.abs(lax.stop_gradient(right)), axis=0, initial=0)
+    unit = jnp.where(largest > 0, largest, 1)
+    return _product(_block_inverse(matrix), right / unit) * unit
+
+
+def _block_inverse(matrix: jax.Array) -> jax.Array:
+    """Inverse of symmetric matrices `(Q, Q, h, w)` by halving them."""
+    if matrix.shape[0] <= 1:
+        return inverse_pivot(matrix)
+    half = matrix.shape[0] // 2
+    a_inverse = _block_inverse(matrix[:half, :half])
+    a_inverse_b = _product(a_inverse, matrix[:half, half:])
+    schur = matrix[half:, half:] - _product(matrix[half:, :half], a_inverse_b)
+    schur_inverse = _block_inverse(schur)
+    upper_right = -_product(a_inverse_b, schur_inverse)
+    upper_left = a_inverse - _product(upper_right, jnp.swapaxes(a_inverse_b, 0, 1))
+    lower_left = jnp.swapaxes(upper_right, 0, 1)
+    top = jnp.concatenate([upper_left, upper_right], axis=1)
+    return jnp.concatenate([top, jnp.concatenate([lower_left, schur_inverse], axis=1)])
+
+
+def _product(a: jax.Array, b: jax.Array) -> jax.Array:
+    """Matrix product over the first two axes."""
+    return jnp.sum(a[:, :, None] * b, axis=1)
+
+
+SOLVERS: dict[str, Callable[[jax.Array, jax.Array], jax.Array]] = {
+    "cholesky": cholesky_solve,
+    "block-inverse": block_inverse_solve,
+}

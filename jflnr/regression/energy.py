@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from jflnr.regression.division import divide
 from jflnr.regression.level import brightness, mean_guides, predict
 from jflnr.regression.moments import index_xy
 from jflnr.regression.pyramid import halve
@@ -49,7 +50,7 @@ def rate(
     """How much of the squared brightness is added: from sums over the frame of the input's
     brightness, of the output's and of its square."""
     wanted = jnp.clip(before, (1 - slack) * wanted, (1 + slack) * wanted)
-    return (wanted - before) / jnp.where(squares > 0, squares, 1)
+    return divide(wanted - before, squares)
 
 
 def scale(coefficients: jax.Array, output: jax.Array, rate: jax.Array) -> jax.Array:
@@ -68,4 +69,4 @@ def rescale(image: jax.Array, light: jax.Array, weight: jax.Array | None) -> jax
     output = jnp.einsum("hwc,c->hw", image, brightness(image.shape[-1], image.dtype))
     after = jnp.sum(jnp.where(counts, output, 0))
     before = jnp.sum(jnp.where(counts, light, 0))
-    return image * jnp.where(after > 0, before / jnp.where(after > 0, after, 1), 1)
+    return image * jnp.where(after > 0, divide(before, after), 1)

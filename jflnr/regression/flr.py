@@ -15,8 +15,9 @@ from jflnr.images.inputs import factor_of, plain_images
 from jflnr.regression.apply import apply
 from jflnr.regression.arguments import check_options, check_regression
 from jflnr.regression.blur import blur
+from jflnr.regression.elimination import Solver
 from jflnr.regression.moments import Guides, centre, channels_of, collect
-from jflnr.regression.solve import Solver, solve
+from jflnr.regression.solve import solve
 from jflnr.stages import Known, Parts, Stage, regress
 
 # Pixels that the window reaches where its width is traced, and the steps that it comes in, so

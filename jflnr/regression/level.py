@@ -8,8 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jflnr.regression.elimination import solve_strips
+from jflnr.regression.division import divide
 from jflnr.regression.moments import index_xx, index_xy
+from jflnr.regression.pyramid import halve
+from jflnr.regression.solve import solve_strips
 from jflnr.regression.window import Window, gather, gather_moments, window_over
 
 if TYPE_CHECKING:
@@ -26,6 +28,14 @@ class Grid(NamedTuple):
     moments: jax.Array
     noise: jax.Array
     block: int
+
+    def pyramid(self, levels: int) -> list[Grid]:
+        """This grid and coarser ones, each of half the resolution."""
+        grids = [self]
+        for _ in range(levels - 1):
+            last = grids[-1]
+            grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+        return grids
 
 
 class Fit(NamedTuple):
@@ -53,10 +63,8 @@ def brightness(channels: int, dtype: jnp.dtype) -> jax.Array:
 
 def mean_guides(moments: jax.Array, guides: int) -> jax.Array:
     """Each block's mean of [1, X - shift], `(Q + 1, h, w)`; [1, 0, ...] where it is empty."""
-    n = moments[:1]
     planes = moments[np.array([index_xx(i, 0) for i in range(guides + 1)])]
-    mean = planes * jnp.where(n > 1e-12, 1 / jnp.where(n > 1e-12, n, 1), 0)
-    return mean.at[0].set(1)
+    return (planes * divide(1, moments[:1], 1e-12)).at[0].set(1)
 
 
 def predict(coefficients: jax.Array, regressors: jax.Array) -> jax.Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from jflnr.regression.division import divide
 from jflnr.regression.level import Fit, Grid, mean_guides, predict
 from jflnr.regression.pyramid import double, halve
 from jflnr.regression.window import Window, gather
@@ -37,7 +38,7 @@ def signal_share(
     planes = jnp.stack([difference**2 / reference, noise / reference, jnp.ones_like(noise)])
     power, noise, count = gather(halve(planes * there), window)
     # Means: far from all light the squares of sums, in the derivative, are too small for float32.
-    inverse = jnp.where(count > 1e-12, 1 / jnp.where(count > 1e-12, count, 1), 0)
+    inverse = divide(1, count, 1e-12)
     power, noise = power * inverse, noise * inverse
     share = jnp.maximum(power - caution * noise, 0) / jnp.maximum(power, 1e-9)
     return double(share, height, width)

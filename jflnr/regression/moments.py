@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from jflnr.regression.strips import cut, fill
+from jflnr.regression.strips import cut, fill, step_of
 
 # One array `(H, W, Q)`, or several that make up the Q channels together, so that the layers of a
 # frame need not be copied into one.
@@ -168,10 +168,7 @@ def _strip_moments(
     if weight is not None and weight.dtype != bool:
         one = jnp.where(good, weight, 0).astype(dtype)
         weighted = [one, *(one * plane for plane in x)]
-    products = [one]
-    for i in range(1, len(weighted)):
-        products += [weighted[i], *(weighted[i] * x[j] for j in range(i))]
-    products += [a * b for a in weighted for b in y]
+    products = _products(weighted, x, y)
     if brightness is not None:
         light = sum(
             (b * plane for b, plane in zip(brightness, y, strict=True)), jnp.zeros_like(one)
@@ -184,9 +181,75 @@ def _strip_moments(
     return sums * np.where(divided, 1, 1 / block**2).astype(dtype)[:, None]
 
 
+def _products(weighted: list[jax.Array], x: list[jax.Array], y: list[jax.Array]) -> list[jax.Array]:
+    """Outer products of [1, X, Y] in the order of the planes. weighted: [1, X] by the weights."""
+    products = [weighted[0]]
+    for i in range(1, len(weighted)):
+        products += [weighted[i], *(weighted[i] * x[j] for j in range(i))]
+    return products + [a * b for a in weighted for b in y]
+
+
 def sum_columns(planes: jax.Array, block: int) -> jax.Array:
     """Sums over every `block` columns: `(..., W)` to `(..., ceil(W / block))`."""
     missing = -planes.shape[-1] % block
     planes = jnp.pad(planes, [(0, 0)] * (planes.ndim - 1) + [(0, missing)])
     # Whole columns at a time: short sums along the last axis would be taken one by one.
     return functools.reduce(jnp.add, (planes[..., k::block] for k in range(block)))
+
+
+def collect_weighted(
+    target: jax.Array,
+    guides: Guides,
+    shift: jax.Array,
+    weight: jax.Array,
+    squares: jax.Array,
+    block: int,
+    unit: jax.Array | float = 1,
+) -> tuple[jax.Array, jax.Array]:
+    """`collect` with the weights of Eq. 9, a number for every pixel, and the mean of `squares`.
+
+    The weighted guides stay in the cache while their products are formed, which counts because
+    every pixel has a weight.
+
+    target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`. weight: `(H, W)`, finite and not
+    negative, 0 where a pixel is not to be used. squares: `(H, W)`, finite. unit: what the target is
+    divided by.
+    Returns `(K, ceil(H/block), ceil(W/block))` and `(1, ceil(H/block), ceil(W/block))`.
+    """
+
+    def strip(first: jax.Array | int, rows: int) -> jax.Array:
+        y, x, w, r = cut((target, guides, weight, squares), first, rows)
+        return _weighted_strip(y / unit, x, w, r, shift, block)
+
+    height, width = (-(-size // block) for size in target.shape[:2])
+    count = plane_count(shift.size, target.shape[2]) + 1
+    empty = jnp.zeros((count, height, width), working_type(target, *jax.tree.leaves(guides)))
+    moments = fill(empty, 1, target.shape[0], block, step_of(block), strip)
+    return moments[:-1], moments[-1:]
+
+
+def _weighted_strip(
+    target: jax.Array,
+    guides: Guides,
+    weight: jax.Array,
+    squares: jax.Array,
+    shift: jax.Array,
+    block: int,
+) -> jax.Array:
+    """Moments of some rows of blocks: `(rows, W, ...)` to `(K + 1, ceil(rows / block), w)`."""
+    used = weight > 0
+    x = [
+        jnp.where(used, from_shift(plane, s), 0)
+        for plane, s in zip(planes(guides), shift, strict=True)
+    ]
+    y = [jnp.where(used, plane, 0) for plane in planes(target)]
+    weighted = [weight, *(weight * plane for plane in x)]
+    weighted, x, y = lax.optimization_barrier((weighted, x, y))
+    products = [*_products(weighted, x, y), squares]
+    # Rows first: contiguous additions; then the columns, with fewer data.
+    missing = -target.shape[0] % block
+    if missing:
+        products = [jnp.pad(product, ((0, missing), (0, 0))) for product in products]
+    sums = [jnp.sum(p.reshape(-1, block, p.shape[1]), axis=1) for p in products]
+    together = lax.optimization_barrier(jnp.stack(lax.optimization_barrier(sums)))
+    return sum_columns(together, block) / block**2

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 from jax import lax
 
 # Rows of pixels that are worked on at a time: enough to keep cores busy.
@@ -47,3 +48,27 @@ def fill(
 def cut(images: Any, first: jax.Array | int, rows: int) -> Any:
     """Some rows of every image `(H, W, ...)` of a pytree."""
     return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows), images)
+
+
+def map_rows(make: Callable[[Any], Any], planes: Any, together: int) -> Any:
+    """`make` of a few rows of a grid of blocks at a time.
+
+    planes: pytree of `(..., h, w)`, of which `make` takes some rows and returns a pytree of such
+    planes. together: blocks at a time, about.
+    """
+    height, width = jax.tree.leaves(planes)[0].shape[-2:]
+    rows = min(max(together // width, 1), height)
+
+    def some(first: jax.Array | int) -> Any:
+        return jax.tree.map(lambda a: lax.dynamic_slice_in_dim(a, first, rows, a.ndim - 2), planes)
+
+    def add(strip: jax.Array, whole: Any) -> Any:
+        # The last strip ends with the grid; what it shares with the one before is the same.
+        first = jnp.minimum(strip * rows, height - rows)
+        made = make(lax.optimization_barrier(some(first)))
+        put = lambda a, b: lax.dynamic_update_slice_in_dim(a, b, first, a.ndim - 2)
+        return jax.tree.map(put, whole, made)
+
+    shapes = jax.eval_shape(make, some(0))
+    empty = lambda a: jnp.zeros((*a.shape[:-2], height, width), a.dtype)
+    return lax.fori_loop(0, -(-height // rows), add, jax.tree.map(empty, shapes))

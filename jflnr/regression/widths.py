@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import jax
@@ -10,7 +11,7 @@ import jax.numpy as jnp
 
 from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
 from jflnr.regression.merge import interpolate, signal_share
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.pyramid import double
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
@@ -61,47 +62,70 @@ def fit_levels(
 
     said: of every grid, from the finest to the coarsest; None without a network.
     """
-    grids = [grid]
-    for _ in range(levels - 1):
-        last = grids[-1]
-        grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+    grids = grid.pyramid(levels)
     heard = list(said) if said is not None else [None] * levels
-    features = guide_features(grids[-1], shift.size, numbers)
-    features, wider = _with(heard[-1], features)
-    system = windowed(grids[-1], features, shift, channels, mean, numbers, wider=wider)
-    coarsest = coarse = fit_level(system, shift.size, channels)
-    merged, steps = coarse.coefficients, list[Step]()
+    coarsest = _fit(grids[-1], heard[-1], True, shift, channels, mean, numbers)
+    last, steps = (coarsest, coarsest.coefficients), list[Step]()
     for grid, own in zip(reversed(grids[:-1]), reversed(heard[:-1]), strict=True):
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
         slopes = grid is not grids[0]
-        steps.append(_refine(grid, coarse, merged, shift, channels, mean, numbers, slopes, own))
-        coarse, merged = steps[-1].fine, steps[-1].merged
+
+        fit = functools.partial(_fit, grid, own, slopes, shift, channels, mean, numbers)
+        steps.append(refine(grid, *last, shift.size, mean, numbers, fit))
+        last = steps[-1].fine, steps[-1].merged
     return coarsest, steps
 
 
-def _refine(
+class Known(NamedTuple):
+    """What a grid knows before its own fit.
+
+    coarse: the fit of the coarser grid, on this one. level: `(h, w)`, brightness found so far.
+    features: `(F, h, w)`, what must be alike in a window.
+    """
+
+    coarse: Fit
+    level: jax.Array
+    features: jax.Array
+
+
+def _fit(
     grid: Grid,
-    coarse: Fit,
-    merged: jax.Array,
+    said: Said | None,
+    slopes: bool,
     shift: jax.Array,
     channels: int,
     mean: jax.Array,
     numbers: AdaptiveFLR,
-    slopes: bool,
-    said: Said | None,
-) -> Step:
-    """One level finer: its own fit, and what is merged so far with its share added."""
-    size = grid.moments.shape[1:]
-    window = coarse.window
-    coarse, merged = interpolate(coarse, *size), double(merged, *size)
-    level = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
-    # Windows end where what is known so far of the brightness changes.
-    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
-    features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
+    known: Known | None = None,
+) -> Fit:
+    """The fit of one grid; `known` but of the coarsest."""
+    features = guide_features(grid, shift.size, numbers) if known is None else known.features
     features, wider = _with(said, features)
     system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes, wider=wider)
-    fine = fit_level(system, shift.size, channels)
+    return fit_level(system, shift.size, channels)
+
+
+def refine(
+    grid: Grid,
+    coarse: Fit,
+    merged: jax.Array,
+    guides: int,
+    mean: jax.Array,
+    numbers: AdaptiveFLR,
+    fit: Callable[[Known], Fit],
+) -> Step:
+    """One level finer: its own fit, and what is merged so far with its share added.
+
+    coarse, merged: of the coarser grid. fit: makes the models of this one.
+    """
+    size, window = grid.moments.shape[1:], coarse.window
+    coarse, merged = interpolate(coarse, *size), double(merged, *size)
+    level = jnp.maximum(predict(merged, mean_guides(grid.moments, guides)), 0)
+    # Windows end where what is known so far of the brightness changes.
+    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
+    features = jnp.concatenate([guide_features(grid, guides, numbers), edge[None]])
+    fine = fit(Known(coarse, level, features))
     reference = level**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     merged = merged + share * (fine.coefficients - coarse.coefficients)

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jflnr.frame import Array
+from jflnr.regression.division import divide
 from jflnr.temporal.reproject import Taps, gather
 
 
@@ -53,7 +54,7 @@ def accumulate(before: Average, image: Array, least: Array | float) -> Average:
     mean, n = before
     good = jnp.all(jnp.isfinite(image), axis=-1, keepdims=True)
     share = jnp.maximum(1 / (n + 1), least)
-    kept = jnp.where(n > 0, (1 - share) ** 2 / jnp.where(n > 0, n, 1), 0)
+    kept = divide((1 - share) ** 2, n)
     samples = 1 / (kept + share**2)
     mixed = mean + share * (jnp.where(good, image, 0) - mean)
     return Average(jnp.where(good, mixed, mean), jnp.where(good, samples, n))

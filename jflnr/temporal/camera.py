@@ -2,48 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
-
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jflnr import checks
+from jflnr.camera import Camera, centres
 from jflnr.frame import Array
 
 # Where nothing is hit, so many scene units away: a turn of the camera moves it, a step does not.
 SKY = 1e6
-
-
-class Camera(NamedTuple):
-    """A pinhole camera that looks along its +z, with x to the left and y up.
-
-    to_world: `(4, 4)`, from its space to the world's. fov_x: full horizontal angle in degrees.
-    """
-
-    to_world: Array
-    fov_x: Array | float
-
-    @classmethod
-    def of(cls, header: Mapping[str, Any]) -> Camera | None:
-        """That of a frame's header (`jflnr.read_header`), or None if it names none.
-
-        Raises `ValueError` if what it says is not a camera.
-        """
-        if "camera_to_world" not in header or "fov_x_degrees" not in header:
-            return None
-        try:
-            to_world = np.array(header["camera_to_world"], np.float32)
-            fov_x = float(header["fov_x_degrees"])
-        except (TypeError, ValueError):
-            to_world, fov_x = np.zeros(0, np.float32), 0.0
-        if to_world.shape != (4, 4) or not np.isfinite(to_world).all() or not 0 < fov_x < 180:
-            raise ValueError(
-                "the header's camera_to_world must be 4 x 4 numbers, and fov_x_degrees between 0 "
-                f"and 180; got {header['camera_to_world']!r} and {header['fov_x_degrees']!r}"
-            )
-        return cls(to_world, fov_x)
 
 
 def camera_motion(depth: Array, camera: Camera, before: Camera) -> jax.Array:
@@ -55,24 +22,10 @@ def camera_motion(depth: Array, camera: Camera, before: Camera) -> jax.Array:
     """
     checks.image("depth", depth, 1)
     height, width = depth.shape[:2]
-    here = _plane_points(height, width, camera.fov_x)
-    rays = jnp.concatenate([here, jnp.ones_like(here[..., :1])], axis=-1)
-    # Straight from one camera to the other: of large world coordinates float32 keeps too little.
+    here = jnp.asarray(centres(width, height), jnp.result_type(float))
+    far = jnp.where(depth > 0, depth, SKY)[..., 0]
+    # About the earlier camera's place: of large world coordinates float32 keeps too little.
     now, then = (jnp.asarray(c.to_world) for c in (camera, before))
-    points = rays * jnp.where(depth > 0, depth, SKY) @ now[:3, :3].T + (now - then)[:3, 3]
-    points = points @ then[:3, :3]
-    ahead = points[..., 2:]
-    there = jnp.where(ahead > 0, points[..., :2] / jnp.where(ahead > 0, ahead, 1), jnp.nan)
-    return here * _pixels(width, camera.fov_x) - there * _pixels(width, before.fov_x)
-
-
-def _pixels(width: int, fov_x: Array | float) -> jax.Array:
-    """Pixels per unit on the plane one unit ahead."""
-    return width / 2 / jnp.tan(jnp.radians(fov_x) / 2)
-
-
-def _plane_points(height: int, width: int, fov_x: Array | float) -> jax.Array:
-    """Where the pixels' rays pass the plane one unit ahead, `(H, W, 2)`, x to the left, y up."""
-    y, x = jnp.mgrid[:height, :width]
-    points = jnp.stack([width / 2 - 0.5 - x, height / 2 - 0.5 - y], axis=-1)
-    return points / _pixels(width, fov_x)
+    points = Camera(now.at[:3, 3].add(-then[:3, 3]), camera.fov_x).points(here, far, width, height)
+    there = Camera(then.at[:3, 3].set(0), before.fov_x).project(points, width, height)
+    return there - here

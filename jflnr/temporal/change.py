@@ -15,8 +15,7 @@ import jax.numpy as jnp
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, light_of
 from jflnr.regression.apply import apply
 from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
-from jflnr.regression.moments import Guides, centre, collect
-from jflnr.regression.weighted_moments import collect_weighted
+from jflnr.regression.moments import Guides, centre, collect, collect_weighted
 from jflnr.regression.widths import guide_features
 from jflnr.regression.window import gather
 

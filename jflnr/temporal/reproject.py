@@ -14,6 +14,7 @@ import jax.numpy as jnp
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
+from jflnr.regression.division import divide
 
 # A tap may be off the pixel's tangent plane by this share of the depth. Positions that are stored
 # as half use up to a quarter of it.
@@ -132,5 +133,4 @@ def _alike(here: Surface, there: Surface, tolerance: jax.Array, same_normal: flo
 
 def _shares(weight: jax.Array) -> jax.Array:
     """The weights over their sum, or 0."""
-    total = jnp.sum(weight, axis=-1, keepdims=True)
-    return weight / jnp.where(total > 0, total, 1)
+    return divide(weight, jnp.sum(weight, axis=-1, keepdims=True))

@@ -12,13 +12,12 @@ from jflnr.images.noisy_guides import smooth_guide
 from jflnr.network import paper, regression
 from jflnr.network.loss import relative
 from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.elimination import solve_strips
+from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.energy import rescale, restore
 from jflnr.regression.flr import FLR
-from jflnr.regression.moments import collect, plane_count
+from jflnr.regression.moments import collect, collect_weighted, plane_count
 from jflnr.regression.pyramid import double, halve
-from jflnr.regression.solve import cholesky_solve, solve
-from jflnr.regression.weighted_moments import collect_weighted
+from jflnr.regression.solve import solve, solve_strips
 from jflnr.regression.window import gather_moments, window_over
 from jflnr.temporal import (
     Average,

@@ -10,9 +10,10 @@ from jax.test_util import check_grads
 
 from jflnr.regression.apply import apply
 from jflnr.regression.blur import blur, gaussian_taps
+from jflnr.regression.elimination import block_inverse_solve, cholesky_solve
 from jflnr.regression.flr import FLR, flr
 from jflnr.regression.moments import collect
-from jflnr.regression.solve import block_inverse_solve, cholesky_solve, solve
+from jflnr.regression.solve import solve
 
 PARAMETERS = FLR(sigma=5.0, eps=1e-2, eps_prime=1e-2)
 SHIFT = np.array([0.1, -0.2])

@@ -91,7 +91,7 @@ def test_a_pickle_is_not_run(tmp_path):
 
     path = tmp_path / "trap.npz"
     path.write_bytes(pickle.dumps(Trap()))
-    with pytest.raises(ValueError, match="cannot be read"):
+    with pytest.raises(ValueError, match="not a file of weights"):
         weights.load(path)
 
 
@@ -99,7 +99,7 @@ def test_a_file_that_unpacks_to_too_much_is_not_read(tmp_path):
     path = tmp_path / "large.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("header.npy", bytes(weights.LARGEST + 1))
-    with pytest.raises(ValueError, match="more than any network"):
+    with pytest.raises(ValueError, match="unpacks to too much"):
         weights.load(path)
 
 

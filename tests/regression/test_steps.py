@@ -7,8 +7,14 @@ import pytest
 
 from jflnr.regression.apply import apply
 from jflnr.regression.blur import blur, gaussian_taps
+from jflnr.regression.elimination import (
+    block_inverse_solve,
+    cholesky_solve,
+    eliminate,
+    factor,
+    substitute,
+)
 from jflnr.regression.moments import centre, collect, index_xx, index_xy, plane_count
-from jflnr.regression.solve import block_inverse_solve, cholesky_solve
 
 
 @pytest.mark.parametrize(("height", "width", "block"), [(16, 24, 8), (13, 10, 4), (7, 5, 1)])
@@ -80,7 +86,11 @@ def test_linear_steps_have_their_adjoint(rng):
         assert adjoint_error(lambda c: apply(c, x, shift, 4), coefficients, rng) < 1e-12
 
 
-@pytest.mark.parametrize("solver", [cholesky_solve, block_inverse_solve])
+def in_two_halves(matrix, right):
+    return substitute(factor(matrix, right), jnp.ones(matrix.shape[1:]))
+
+
+@pytest.mark.parametrize("solver", [cholesky_solve, block_inverse_solve, eliminate, in_two_halves])
 @pytest.mark.parametrize("size", [0, 1, 2, 3, 5, 8, 16])
 def test_solvers_against_numpy(rng, solver, size):
     factor = rng.standard_normal((6, size, size + 2))

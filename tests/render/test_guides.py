@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.render.camera import Camera
 from experiments.render.source import load, shared_frames, shared_scenes
 from experiments.render.tracer import Tracer
+from jflnr.camera import Camera
 from jflnr.exr import read_attributes, read_channels
 
 
@@ -38,14 +38,6 @@ def test_position_is_what_depth_and_camera_say(tracer: Tracer, room: Any) -> Non
     points = camera.points(pixels, tracer.guides["depth"][..., 0], 64, 36)
     np.testing.assert_allclose(points, tracer.guides["position"], atol=2e-5)
     np.testing.assert_allclose(camera.project(points, 64, 36), pixels, atol=1e-6)
-
-
-def test_camera_convention() -> None:
-    """Looks along +z, x to the left."""
-    camera = Camera.looking([0, 0, 0], [0, 0, 5], 90.0)
-    np.testing.assert_allclose(camera.to_world, np.eye(4), atol=1e-12)
-    left, right = camera.project(np.array([[0.5, 0, 1.0], [-0.5, 0, 1.0]]), 100, 50)
-    assert left[0] == pytest.approx(25) and right[0] == pytest.approx(75)
 
 
 def _layer(channels: dict[str, Any], name: str, axes: str) -> np.ndarray:

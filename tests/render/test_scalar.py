@@ -9,11 +9,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from experiments.render.camera import Camera
 from experiments.render.reference import Accumulator, Goal
 from experiments.render.scene import build
 from experiments.render.tracer import Tracer
 from experiments.scenes.catalogue import world_of
+from jflnr.camera import Camera
 
 SIZE = 16, 9
 

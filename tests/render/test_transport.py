@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from experiments.render.camera import Camera
+from experiments.render.camera import looking
 from experiments.render.reference import Accumulator, Goal
 from experiments.render.tracer import Tracer, _primary_ray
 
@@ -34,7 +34,7 @@ def furnace() -> Tracer:
             },
         }
     )
-    return Tracer.of(scene, Camera.looking([0, 0.2, 1.6], [0, 0, 0], 20.0), 16, 9)
+    return Tracer.of(scene, looking([0, 0.2, 1.6], [0, 0, 0], 20.0), 16, 9)
 
 
 @pytest.mark.parametrize("mis", [True, False])

@@ -1,32 +1,63 @@
-"""Motion of points under a moving camera, against the renderer's projection in float64."""
+"""The pinhole camera and motion of points under it, against matrices of the textbook in float64."""
 
 import numpy as np
 import pytest
 
-from experiments.render.camera import Camera as Rendered
+from experiments.render.camera import looking
+from jflnr.camera import centres
 from jflnr.temporal import Camera, camera_motion
 
 HEIGHT, WIDTH = 9, 14
-FROM = Rendered.looking((3, 2, -5), (0, 1, 0), 60)
-TO = Rendered.looking((3.3, 2.1, -4.8), (0, 1, 0.2), 50)
+FROM = looking((3, 2, -5), (0, 1, 0), 60)
+TO = looking((3.3, 2.1, -4.8), (0, 1, 0.2), 50)
 
 
-def ours(camera: Rendered, moved: float = 0.0) -> Camera:
-    matrix = camera.to_world.copy()
-    matrix[:3, 3] += moved
-    return Camera(matrix.astype(np.float32), camera.fov_x)
+def to_pixels(camera: Camera) -> np.ndarray:
+    """World to homogeneous pixels and depth: intrinsics times the inverse of the pose, `(4, 4)`."""
+    focal = WIDTH / 2 / np.tan(np.radians(camera.fov_x) / 2)
+    across, down = [-focal, 0, WIDTH / 2, 0], [0, -focal, HEIGHT / 2, 0]
+    return np.array([across, down, [0, 0, 1, 0], [0, 0, 0, 1]]) @ np.linalg.inv(camera.to_world)
+
+
+def projected(camera: Camera, points: np.ndarray) -> np.ndarray:
+    flat = np.concatenate([points, np.ones_like(points[..., :1])], -1) @ to_pixels(camera).T
+    return flat[..., :2] / flat[..., 2:3]
+
+
+def points_of(camera: Camera, depth: np.ndarray) -> np.ndarray:
+    here = centres(WIDTH, HEIGHT)
+    seen = np.concatenate([here * depth, depth, np.ones_like(depth)], -1)
+    return (seen @ np.linalg.inv(to_pixels(camera)).T)[..., :3]
+
+
+@pytest.fixture
+def depth() -> np.ndarray:
+    return np.random.default_rng(0).uniform(2, 9, (HEIGHT, WIDTH, 1)).astype(np.float32)
+
+
+def test_points_and_pixels(depth: np.ndarray) -> None:
+    points = TO.points(centres(WIDTH, HEIGHT), depth[..., 0], WIDTH, HEIGHT)
+    np.testing.assert_allclose(points, points_of(TO, depth), atol=1e-12)
+    found = FROM.project(points, WIDTH, HEIGHT)
+    np.testing.assert_allclose(found, projected(FROM, points), atol=1e-10)
+
+
+def test_left_is_positive_x_and_up_positive_y() -> None:
+    camera = looking([0, 0, 0], [0, 0, 5], 90)
+    np.testing.assert_allclose(camera.to_world, np.eye(4), atol=1e-12)
+    found = camera.project(np.array([[0.5, 0.25, 1], [-0.5, 0, 1]]), 100, 50)
+    np.testing.assert_allclose(found, [[25, 12.5], [75, 25]])
 
 
 @pytest.mark.parametrize("moved", [0.0, 1e3])
-def test_as_the_renderer_projects(moved: float) -> None:
-    depth = np.random.default_rng(0).uniform(2, 9, (HEIGHT, WIDTH, 1)).astype(np.float32)
+def test_motion(depth: np.ndarray, moved: float) -> None:
     depth[0] = 0
-    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
-    here = np.stack([x, y], -1)
-    far = np.where(depth > 0, depth, 1e6)[..., 0]
-    points = TO.points(here, far, WIDTH, HEIGHT)
-    wanted = FROM.project(points, WIDTH, HEIGHT) - here
-    motion = camera_motion(depth, ours(TO, moved), ours(FROM, moved))
+    points = points_of(TO, np.where(depth > 0, depth.astype(float), 1e6))
+    wanted = projected(FROM, points) - centres(WIDTH, HEIGHT)
+    away = np.zeros((4, 4))
+    away[:3, 3] = moved
+    now, then = (Camera(c.to_world + away, c.fov_x) for c in (TO, FROM))
+    motion = camera_motion(depth, now, then)
     assert np.abs(wanted).max() > 1
     np.testing.assert_allclose(motion, wanted, atol=1e-3 if moved else 1e-4)
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from experiments.render import frame
-from experiments.render.camera import Camera
 from experiments.render.commands.one import STATES
 from experiments.render.progress import Progress
 from experiments.render.reference import Goal
 from experiments.render.source import load
 from experiments.render.tracer import Tracer
 from jflnr import read_header
+from jflnr.camera import Camera
 from jflnr.exr import layers_of, read_channels
 
 KEPT = ("scene", "view", "split")

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from experiments.render import frame, sequence
-from experiments.render.camera import Camera
 from experiments.render.manifest import Manifest
 from experiments.render.progress import Progress
 from experiments.render.reference import Goal
 from experiments.render.sequence import Shot
 from experiments.render.source import RANDOM, Source, load
 from experiments.render.splits import split_of
+from jflnr.camera import Camera
 
 STATES = Path("cache/state")
 

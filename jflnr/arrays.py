@@ -1,0 +1,76 @@
+"""Trees of arrays in a file: a plain .npz, with a header of JSON. Nothing is ever unpickled."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jflnr.files import replacing
+
+HEADER = "header"
+
+
+def write(path: str | Path, header: Mapping[str, Any], tree: Any, compress: bool = False) -> None:
+    """Write a pytree, whole or not at all, each leaf under its name. header: what JSON can hold."""
+    arrays: dict[str, Any] = {HEADER: np.frombuffer(json.dumps(header).encode(), np.uint8)}
+    arrays |= {name: np.asarray(leaf) for name, leaf in _leaves(tree).items()}
+    save = np.savez_compressed if compress else np.savez
+    with replacing(path) as beside, beside.open("wb") as file:
+        save(file, **arrays)
+
+
+def read(
+    path: str | Path, wanted: str, largest: int | None = None
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of a file that `write` wrote.
+
+    wanted: what the file should be, for messages. largest: bytes that it may unpack to; by default
+    its own size, which is right for what is not compressed.
+    Raises `ValueError`, in one sentence, if it is no such file.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            with zipfile.ZipFile(file) as archive:
+                size = sum(entry.file_size for entry in archive.infolist())
+            if size <= (path.stat().st_size if largest is None else largest):
+                file.seek(0)
+                with np.load(file, allow_pickle=False) as stored:
+                    arrays = {name: stored[name] for name in stored.files}
+                header = json.loads(arrays.pop(HEADER).tobytes())
+                if isinstance(header, dict):
+                    return header, arrays
+    except FileNotFoundError:
+        raise ValueError(f"{path}: there is no such file; it should be {wanted}") from None
+    except Exception:  # damaged archives fail in many ways, some undocumented
+        raise ValueError(f"{path}: not {wanted}, or damaged") from None
+    raise ValueError(f"{path}: unpacks to too much, or has no header; it should be {wanted}")
+
+
+def restore(arrays: Mapping[str, np.ndarray], like: Any) -> Any:
+    """The pytree, with the structure and the types of `like`.
+
+    Raises `ValueError`, naming an array, if the names or shapes are others.
+    """
+    leaves = _leaves(like)
+    shapes = {name: np.shape(leaf) for name, leaf in leaves.items()}
+    found = {name: array.shape for name, array in arrays.items()}
+    if odd := sorted(n for n in found | shapes if found.get(n) != shapes.get(n)):
+        name = odd[0]
+        raise ValueError(
+            f"array {name[:80]} has shape {found.get(name)} and should have {shapes.get(name)}"
+        )
+    types = (getattr(leaf, "dtype", None) for leaf in leaves.values())
+    restored = [np.asarray(arrays[n], dtype) for n, dtype in zip(leaves, types, strict=True)]
+    return jax.tree.unflatten(jax.tree.structure(like), restored)
+
+
+def _leaves(tree: Any) -> dict[str, Any]:
+    named = jax.tree_util.tree_leaves_with_path(tree)
+    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in named}
