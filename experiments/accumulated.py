@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from experiments import plots, results, resume, shots
-from jflnr import temporal_metrics
+from experiments import resume, shots, temporal_metrics
+from experiments.results import Parts, pivoted
 from jflnr.flr import adaptive, energy, widths
 from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
 from jflnr.flr.apply import apply, with_borders
@@ -43,10 +42,12 @@ BLOCK = 4
 # Least share of a new frame; of a new output where what it was fitted to is an average already.
 LEAST, LEAST_OUTPUT = 0.05, 0.3
 
+TABLES = {"psnr": "PSNR, dB", "warped": "warped error", "lag": "lag in frames"}
+
 State = dict[str, Any]
 
 
-def run(quick: bool) -> dict[str, Any]:
+def run(quick: bool) -> Parts:
     """PSNR, flicker and lag of every variant on the sequences of train and val."""
     names = ["made up"] if quick else shots.names()
     names = [name for name in names if shots.load(name).split != "test"]
@@ -54,9 +55,12 @@ def run(quick: bool) -> dict[str, Any]:
 
     def row(key: str) -> dict[str, Any]:
         name, variant = key.split("|")
-        return {"shot": name, "variant": variant} | measured(shots.load(name), variant)
+        return {"shot": name.replace("_", ", "), "averaged": variant} | measured(
+            shots.load(name), variant
+        )
 
-    return {"rows": resume.rows(f"{NAME}{'-quick' * quick}", keys, row)}
+    rows = resume.rows(f"{NAME}{'-quick' * quick}", keys, row)
+    return {title: pivoted(rows, "averaged", "shot", key) for key, title in TABLES.items()}
 
 
 def measured(shot: shots.Shot, variant: str) -> dict[str, Any]:
@@ -170,25 +174,3 @@ def to_image(planes: jax.Array) -> jax.Array:
 
 def to_planes(image: jax.Array) -> jax.Array:
     return jnp.moveaxis(image, -1, 0)
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """accumulated.md: PSNR, warped error and lag, variants down and sequences across."""
-    parts = [
-        f"PSNR in dB\n\n{table(result['rows'], 'psnr')}",
-        f"Warped temporal error x 1000\n\n{table(result['rows'], 'warped', 1000)}",
-        f"Lag in frames\n\n{table(result['rows'], 'lag')}",
-    ]
-    plots.write_text(folder / f"{NAME}.md", "\n".join(parts))
-
-
-def table(rows: Sequence[dict[str, Any]], key: str, factor: float = 1) -> str:
-    """One metric."""
-    lines: dict[str, dict[str, Any]] = {}
-    for row in rows:
-        if key in row:
-            line = lines.setdefault(row["variant"], {"variant": row["variant"]})
-            line[row["shot"]] = factor * row[key]
-    shown = dict.fromkeys(row["shot"] for row in rows if key in row)
-    columns = {"variant": "averaged"} | {name: name.replace("_", ", ") for name in shown}
-    return results.table(list(lines.values()), columns)

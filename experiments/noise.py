@@ -36,13 +36,13 @@ def _rendered(path: Path, counts: tuple[int, ...], realisations: int) -> dict[st
     label = "-".join(map(str, (path.parent.name, path.stem, *counts, realisations)))
     kept = FOLDER / f"{label}.npz"
     if not kept.exists():
-        from experiments.render import backend
+        from experiments.rendering import backend
 
         backend.start()
-        from experiments.render import frame
-        from experiments.render.camera import Camera
-        from experiments.render.source import load
-        from experiments.render.tracer import Tracer
+        from experiments.rendering import frame
+        from experiments.rendering.camera import Camera
+        from experiments.rendering.source import load
+        from experiments.rendering.tracer import Tracer
         from jflnr.files import replacing
 
         facts = jflnr.read_header(path)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.render.camera import Camera as Rendered
+from experiments.rendering.camera import Camera as Rendered
 from jflnr.temporal import Camera, camera_motion
 
 HEIGHT, WIDTH = 9, 14
