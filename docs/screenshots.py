@@ -1,6 +1,6 @@
 """Makes the pictures of the report in docs/, in headless Chromium.
 
-    python docs/screenshots.py
+python docs/screenshots.py
 """
 
 import shutil
