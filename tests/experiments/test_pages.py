@@ -62,8 +62,9 @@ MEASURED = {
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
     """Results of one experiment, and a page whose figures are not theirs."""
+    for name in ("results", "docs"):
+        (tmp_path / name).mkdir()
     results.write(tmp_path / "results" / "upsample.json", [MEASURED])
-    (tmp_path / "docs").mkdir()
     page = (
         "<!--upsample:means:a;1:psnr-->0.0 and <!--upsample:means:b - a:psnr-->9.00, "
         "<!--upsample:means:b / a:psnr-->0, [all](../results/upsample.json)"
