@@ -5,12 +5,14 @@ from typing import Any
 
 from experiments import pages, results
 
+FOUND = pages.everything(results.FOLDER)
+
 
 def on_pre_build(config: Any) -> None:
-    """Write docs/figures."""
-    pages.write(results.FOLDER, Path(config["docs_dir"]))
+    """Write the tables into docs/figures; `python -m experiments pages` draws the charts."""
+    pages.tables(FOUND, Path(config["docs_dir"]) / "figures")
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Link the pages of results, and tell where the figures are from."""
-    return pages.noted(markdown, results.FOLDER)
+    return pages.noted(markdown, FOUND)

@@ -28,17 +28,27 @@ CHANGED = "**The code has changed since.**"
 
 
 def write(folder: Path, docs: Path) -> None:
-    """Write docs/figures from the JSON files in `folder`, and the figures in prose anew."""
-    made = docs / "figures"
-    made.mkdir(parents=True, exist_ok=True)
-    found = {name: results.read(path) for name in NAMES if (path := _file(folder, name)).exists()}
+    """Charts and tables into docs/figures from the JSON files in `folder`; figures in prose."""
+    found = everything(folder)
     for name, evidence in found.items():
-        draw(name, results.parts(evidence), made)
-        write_text(made / f"{name}.md", page(name, evidence, (made / f"{name}.png").exists()))
+        draw(name, results.parts(evidence), docs / "figures")
+    tables(found, docs / "figures")
     for path in prose(docs):
         text = path.read_text()
         if (current := filled(text, found)) != text:
             write_text(path, current)
+
+
+def everything(folder: Path) -> dict[str, list[Row]]:
+    """All results that are there, by name."""
+    return {name: results.read(path) for name in NAMES if (path := _file(folder, name)).exists()}
+
+
+def tables(found: dict[str, list[Row]], folder: Path) -> None:
+    """A page for each experiment."""
+    for name, evidence in found.items():
+        text = page(name, evidence, (folder / f"{name}.png").exists())
+        write_text(folder / f"{name}.md", text)
 
 
 def prose(docs: Path) -> list[Path]:
@@ -56,11 +66,12 @@ def draw(name: str, parts: Parts, folder: Path) -> None:
     charts = getattr(experiment(name), "charts", None)
     if charts is None or drawn_from(path) == digest:
         return
+    folder.mkdir(exist_ok=True)
     charts(parts, folder)
     about = PngInfo()
     about.add_text("results", digest)
     with Image.open(path) as picture:
-        picture.quantize(128).save(path, pnginfo=about, optimize=True)
+        picture.convert("RGB").quantize(128).save(path, pnginfo=about, optimize=True)
 
 
 def drawn_from(path: Path) -> str | None:
@@ -118,13 +129,13 @@ def value(found: dict[str, list[Row]], name: str, part: str, row: str, column: s
     return mine[0][column]
 
 
-def noted(text: str, folder: Path) -> str:
+def noted(text: str, found: dict[str, list[Row]]) -> str:
     """A page of the site: results are linked as pages, and where figures are from is told."""
     names = dict.fromkeys(match[1] for match in FIGURE.finditer(text))
     notes = [
         f"- [{name}](figures/{name}.md): {', '.join(measured['parts'])}: {_provenance(measured)}"
         for name in names
-        for measured in results.read(_file(folder, name))
+        for measured in found[name]
     ]
     ending = "\n\n## Where the figures are from\n\n" + "\n".join(notes) if notes else ""
     return LINK.sub(r"(figures/\1.md)", text) + ending

@@ -16,7 +16,7 @@ PAGES = pages.prose(DOCS)
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, list[results.Row]]:
-    return {path.stem: results.read(path) for path in FILES}
+    return pages.everything(results.FOLDER)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -62,7 +62,7 @@ MEASURED = {
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
     """Results of one experiment, and a page whose figures are not theirs."""
-    for name in ("results", "docs"):
+    for name in ("results", "docs", "docs/figures"):
         (tmp_path / name).mkdir()
     results.write(tmp_path / "results" / "upsample.json", [MEASURED])
     page = (
@@ -80,7 +80,7 @@ def test_pages_are_made_from_results(site: Path) -> None:
     assert re.sub("<!--.*?-->", "", text).startswith("20.0 and 4.50, 1, ")
     made = (site / "docs" / "figures" / "upsample.md").read_text()
     assert "| a | 1 | 20 |\n| b |  | 24.5 |" in made
-    noted = pages.noted(text, site / "results")
+    noted = pages.noted(text, pages.everything(site / "results"))
     assert "[all](figures/upsample.md)" in noted
     for page in (made, noted):
         assert "commit 000" in page and "2026-01-02, an abacus" in page and pages.CHANGED in page
