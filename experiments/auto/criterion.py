@@ -21,7 +21,7 @@ from jflnr.flr.level import brightness
 from jflnr.flr.moments import centre, collect, index_xy
 from jflnr.inputs import flr_images
 
-NAME = "criterion"
+NAME = "auto-criterion"
 
 NAMES = ("normal", "depth", "ao")
 SIGMAS = (8, 16, 32)

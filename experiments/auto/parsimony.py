@@ -24,7 +24,7 @@ from jflnr.metrics import measure
 from jflnr.selection.method import denoise_on_blocks, plan_of
 from jflnr.selection.plan import BLOCKS
 
-NAME = "parsimony"
+NAME = "auto-parsimony"
 
 # Of the times, whose best counts.
 REPEATS = 5

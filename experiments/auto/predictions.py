@@ -20,7 +20,7 @@ from jflnr.selection import plan as plans
 from jflnr.selection.glance import is_simple
 from jflnr.selection.method import denoise_on_blocks
 
-NAME = "predictions"
+NAME = "auto-predictions"
 
 # The first view of every rendered training scene, beside those of the data folder.
 RENDERED = "*_100.exr"

@@ -16,7 +16,7 @@ from jflnr.flnr.train import Settings, train
 from jflnr.frame import Frame
 from jflnr.inputs import frame_inputs
 
-NAME = "finetune"
+NAME = "training-finetune"
 
 METHOD = "flnr-tiny"
 STEPS, EVERY = 120, 30

@@ -10,7 +10,7 @@ from experiments.training import shared
 from jflnr.flnr import examples
 from jflnr.flnr.train import CONFIGS, Settings, train
 
-NAME = "learning_curve"
+NAME = "training-learning_curve"
 
 STEPS, EVERY = 1200, 100
 # Name of the part: share of the scenes, views of each at most.

@@ -16,7 +16,7 @@ from jflnr.flnr import loss, regression
 from jflnr.flnr.adam import Adam
 from jflnr.flnr.train import CONFIGS, Settings, rate_of
 
-NAME = "optimisers"
+NAME = "training-optimisers"
 
 SECONDS = 120.0
 # Of frames and validation crops.

@@ -25,7 +25,7 @@ from jflnr.flr.parameters import DEFAULT
 from jflnr.frame import Array, Frame
 from jflnr.inputs import adaptive_images, frame_inputs
 
-NAME = "paper_form"
+NAME = "training-paper_form"
 
 # Of a processor, and steps between validations.
 TRAINING, EVERY = 25 * 60, 100
