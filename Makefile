@@ -21,6 +21,7 @@ lint: $(VENV)/test
 	$(RUN) -m mypy
 
 site: $(VENV)/test
+	$(RUN) -m experiments pages
 	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build
 
 $(VENV)/bin/python:

@@ -1,9 +1,6 @@
-"""Makes the pictures of the report and the site in docs/, in headless Chromium.
+"""Makes the pictures of the report in docs/, in headless Chromium.
 
-    python docs/screenshots.py
-
-The chart's needs out/report.html (`python -m experiments report`), the site's out/site (`make
-site`); without them these two are left as they are.
+python docs/screenshots.py
 """
 
 import shutil
@@ -41,14 +38,6 @@ def main() -> None:
         laptop.mouse.move(330, 330)
         shoot(laptop, "report_error.png")
         shoot(open_page(browser, path, width=390, height=844, has_touch=True), "report_phone.png")
-        if (results := Path("out/report.html")).exists():
-            page = open_page(browser, results, width=1180, height=760)
-            page.evaluate("document.getElementById('chart').scrollIntoView()")
-            shoot(page, "report_chart.png")
-        if (site := Path("out/site/method/index.html")).exists():
-            page = browser.new_page(viewport={"width": 1360, "height": 900})
-            page.goto(site.resolve().as_uri() + "#the-equations")
-            shoot(page, "site.png")
 
 
 def open_page(browser: Any, path: Path, width: int, height: int, **options: Any) -> Any:

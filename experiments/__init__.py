@@ -1,1 +1,1 @@
-"""How jflnr argues: one file per question. `python -m experiments list` names them."""
+"""How jflnr argues: one experiment per question. `python -m experiments list` names them."""

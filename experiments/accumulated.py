@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jflnr.inputs import adaptive_images, prepare
 
-from experiments import plots, results, resume, shots
-from jflnr import temporal_metrics
+from experiments import resume, shots, temporal_metrics
+from experiments.results import Parts, pivoted
+from jflnr.frame import Array, Frame
+from jflnr.images.inputs import prepare
 from jflnr.regression import adaptive, energy, widths
-from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.apply import apply, with_borders
 from jflnr.regression.moments import centre
-from jflnr.frame import Array, Frame
-from jflnr.inputs import adaptive_images, prepare
 from jflnr.temporal import Average, Surface, accumulate, find_taps, reproject
 from jflnr.temporal.accumulate import nothing
 
@@ -43,10 +43,12 @@ BLOCK = 4
 # Least share of a new frame; of a new output where what it was fitted to is an average already.
 LEAST, LEAST_OUTPUT = 0.05, 0.3
 
+TABLES = {"psnr": "PSNR, dB", "warped": "warped error", "lag": "lag in frames"}
+
 State = dict[str, Any]
 
 
-def run(quick: bool) -> dict[str, Any]:
+def run(quick: bool) -> Parts:
     """PSNR, flicker and lag of every variant on the sequences of train and val."""
     names = ["made up"] if quick else shots.names()
     names = [name for name in names if shots.load(name).split != "test"]
@@ -54,9 +56,12 @@ def run(quick: bool) -> dict[str, Any]:
 
     def row(key: str) -> dict[str, Any]:
         name, variant = key.split("|")
-        return {"shot": name, "variant": variant} | measured(shots.load(name), variant)
+        return {"shot": name.replace("_", ", "), "averaged": variant} | measured(
+            shots.load(name), variant
+        )
 
-    return {"rows": resume.rows(f"{NAME}{'-quick' * quick}", keys, row)}
+    rows = resume.rows(f"{NAME}{'-quick' * quick}", keys, row)
+    return {title: pivoted(rows, "averaged", "shot", key) for key, title in TABLES.items()}
 
 
 def measured(shot: shots.Shot, variant: str) -> dict[str, Any]:
@@ -121,7 +126,7 @@ def step(
     images, state = adaptive_images(frame, names), dict(state)
     target, guides, weight = jnp.asarray(images["target"]), images["guides"], images["weight"]
     weight = jnp.ones(target.shape[:2]) if weight is None else jnp.where(weight, 1.0, 0.0)
-    here, before, numbers = Surface.of(frame), state["surface"], ADAPTIVE_DEFAULT.numbers()
+    here, before, numbers = Surface.of(frame), state["surface"], AdaptiveFLR()
 
     def average(name: str, image: jax.Array, block: int, least: float = LEAST) -> jax.Array:
         state[name] = accumulate(moved(state[name], frame, before, block), image, least)
@@ -170,25 +175,3 @@ def to_image(planes: jax.Array) -> jax.Array:
 
 def to_planes(image: jax.Array) -> jax.Array:
     return jnp.moveaxis(image, -1, 0)
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """accumulated.md: PSNR, warped error and lag, variants down and sequences across."""
-    parts = [
-        f"PSNR in dB\n\n{table(result['rows'], 'psnr')}",
-        f"Warped temporal error x 1000\n\n{table(result['rows'], 'warped', 1000)}",
-        f"Lag in frames\n\n{table(result['rows'], 'lag')}",
-    ]
-    plots.write_text(folder / f"{NAME}.md", "\n".join(parts))
-
-
-def table(rows: Sequence[dict[str, Any]], key: str, factor: float = 1) -> str:
-    """One metric."""
-    lines: dict[str, dict[str, Any]] = {}
-    for row in rows:
-        if key in row:
-            line = lines.setdefault(row["variant"], {"variant": row["variant"]})
-            line[row["shot"]] = factor * row[key]
-    shown = dict.fromkeys(row["shot"] for row in rows if key in row)
-    columns = {"variant": "averaged"} | {name: name.replace("_", ", ") for name in shown}
-    return results.table(list(lines.values()), columns)

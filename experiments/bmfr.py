@@ -1,24 +1,21 @@
-"""BMFR's own tables: time by kernel, OpenCL against JAX, and what its noise is for."""
+"""BMFR's own tables: time by kernel, and OpenCL against JAX."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
-import jflnr
-from experiments import plots, results, shots
+from experiments import shots
 from experiments.methods import backends
-from experiments.speed import enlarge, interleaved
-from jflnr.metrics import display, exposure
-from jflnr.temporal import bmfr
-from jflnr.temporal.bmfr import BmfrParameters
+from experiments.results import Parts
+from experiments.speed import enlarge
+from experiments.timing import interleaved
+from jflnr.bmfr import pipeline as bmfr
+from jflnr.bmfr.pipeline import BMFR
 
 NAME = "bmfr"
-QUESTION = "Where does BMFR's time go, do both back ends agree, and what is its noise for?"
+QUESTION = "Where does BMFR's time go, and do both back ends agree?"
 MINUTES = 1
 
 WIDTH, HEIGHT = 1280, 720
@@ -36,13 +33,13 @@ LAYERS = ("light", "fitted", "picture")
 LENGTH = 16  # frames
 
 
-def run(quick: bool) -> dict[str, Any]:
+def run(quick: bool) -> Parts:
     """Milliseconds by kernel and block at 1280 x 720, and the largest differences by sequence."""
     names = shots.names()[: 1 if quick else None]
     rows = [agreement(shots.load(name), block) for name in names for block in BLOCKS]
     size = (90, 160) if quick else (HEIGHT, WIDTH)
-    pictured = next((name for name in names if name.endswith("camera")), names[-1])
-    return {"kernels": kernels(size, 1 if quick else 15), "agreement": rows, "shot": pictured}
+    times = kernels(size, 1 if quick else 15)
+    return {"kernels, 1280 x 720": times, "OpenCL against JAX": rows}
 
 
 def kernels(size: tuple[int, int], repeats: int) -> list[dict[str, Any]]:
@@ -58,7 +55,7 @@ def kernels(size: tuple[int, int], repeats: int) -> list[dict[str, Any]]:
     target = np.zeros_like(source)
     rows: dict[str, dict[str, Any]] = {}
     for block in BLOCKS:
-        parameters = BmfrParameters(block=block)
+        parameters = BMFR(block=block)
         history, _ = on_device.step(on_device.start(before), before, parameters)
         work = lambda h=history, p=parameters: on_device.step(h, now, p)
         floor = interleaved({"floor": lambda: np.copyto(target, source)}, repeats)["floor"]
@@ -75,7 +72,7 @@ def agreement(shot: shots.Shot, block: int) -> dict[str, Any]:
     """Largest difference between JAX and OpenCL over a sequence, of each layer's largest value."""
     from jflnr.opencl import bmfr as on_device
 
-    parameters = BmfrParameters(block=block)
+    parameters = BMFR(block=block)
     frames = shot.frames[:LENGTH]
     ours, right = on_device.start(frames[0]), bmfr.start(frames[0])
     row: dict[str, Any] = dict.fromkeys(("image", *LAYERS), 0.0)
@@ -92,55 +89,3 @@ def agreement(shot: shots.Shot, block: int) -> dict[str, Any]:
 def difference(found: np.ndarray, right: np.ndarray) -> float:
     """The largest, relative to the largest value."""
     return float(np.abs(found - right).max() / np.abs(right).max())
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """bmfr_figures.md and bmfr.jpg."""
-    times = {
-        f"{block} {unit}": f"{block} x {block}, {unit}"
-        for block in BLOCKS
-        for unit in ("ms", "floors")
-    }
-    columns = {"kernel": "kernel", "mb": "MB", **times, "paper": "paper, ms"}
-    text = results.table(result["kernels"], columns)
-    columns = {name: name for name in ("sequence", "block", "frames", "image", *LAYERS)}
-    text += "\n" + results.table(result["agreement"], columns)
-    plots.write_text(folder / f"{NAME}_figures.md", text)
-    shot = shots.load(result["shot"])
-    pictures = stages(shot.frames[:LENGTH])
-    with plots.figure(folder / f"{NAME}.jpg", columns=3, rows=2, size=(4, 2.5)) as axes:
-        for axis, (title, picture) in zip(axes, pictures.items(), strict=True):
-            axis.imshow(picture, interpolation="nearest")
-            axis.set(xticks=[], yticks=[], title=title)
-            axis.grid(False)
-
-
-def stages(frames: Sequence[jflnr.Frame]) -> dict[str, np.ndarray]:
-    """Pictures of the indirect light, NaN in magenta."""
-    first, last = frames[0], frames[-1]
-    lights: dict[str, tuple[jflnr.Frame, Any]] = {"1 sample per pixel": (last, last.indirect)}
-    raw = bmfr.PAPER._replace(noise=0.0)
-    lights["first frame, without noise on features"] = first, after([first], raw)
-    lights["first frame"] = first, after([first], bmfr.PAPER)
-    lights[f"after {len(frames)} frames, without TAA"] = (
-        last,
-        after(frames, bmfr.PAPER._replace(picture_share=1.0)),
-    )
-    lights[f"after {len(frames)} frames"] = last, after(frames, bmfr.PAPER)
-    lights["reference"] = last, last.reference
-    return {name: shown(frame, np.asarray(light)) for name, (frame, light) in lights.items()}
-
-
-def after(frames: Sequence[jflnr.Frame], parameters: BmfrParameters) -> jax.Array:
-    """The image of the last frame."""
-    history = bmfr.start(frames[0])
-    for frame in frames:
-        history, image = bmfr.step(history, frame, parameters)
-    return image
-
-
-def shown(frame: jflnr.Frame, light: np.ndarray) -> np.ndarray:
-    """As in the metrics, for the eye."""
-    albedo, reference = np.asarray(frame.albedo), np.asarray(frame.reference)
-    picture = display(albedo * light, exposure(albedo * reference))
-    return np.where(np.isfinite(light), picture, np.array([1, 0, 1], np.float32))

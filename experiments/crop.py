@@ -14,18 +14,18 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jflnr.inputs import adaptive_images, flr_images
 
 from jflnr.denoising import Part, denoise_flr, support_of
-from jflnr.regression import adaptive, energy, widths
-from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.regression.apply import apply, with_borders
-from jflnr.regression.floor import with_own_light
-from jflnr.regression.level import mean_guides
-from jflnr.regression.parameters import DEFAULT
 from jflnr.frame import Frame
-from jflnr.inputs import adaptive_images, flr_images
 from jflnr.large.scanlines import Scanlines
 from jflnr.large.source import Rows, scene_of, shift_of
+from jflnr.regression import adaptive, energy, widths
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.apply import apply, with_borders
+from jflnr.regression.floor import with_own_light
+from jflnr.regression.flr import DEFAULT
+from jflnr.regression.level import mean_guides
 
 NAMES = ("normal", "depth", "ao")
 LAYERS = {*NAMES, "indirect", "mask"}
@@ -119,7 +119,7 @@ def _mean(rows: Rows) -> float:
 @jax.jit
 def _fit(images: dict[str, Any], shift: jax.Array, mean: jax.Array) -> tuple[jax.Array, ...]:
     """As `adaptive.fit_frame`: models, the brightness that they give, mean guides of the blocks."""
-    numbers, block, guides = ADAPTIVE_DEFAULT.numbers(), BLOCK // 2, shift.size
+    numbers, block, guides = AdaptiveFLR(), BLOCK // 2, shift.size
     target, x, weight = images["target"], images["guides"], images["weight"]
     moments = adaptive.collect_light(target, x, shift, weight, block)
     models = with_borders(adaptive.fit_pilot(moments, mean, shift, numbers, block))
@@ -136,5 +136,5 @@ def _evaluate(
 ) -> jax.Array:
     models, brightness, guides = fitted
     models = with_own_light(energy.scale(models, brightness, rate), guides)
-    floor = ADAPTIVE_DEFAULT.numbers().floor
+    floor = AdaptiveFLR().floor
     return apply(models, images["guides"], shift, BLOCK // 2, floor)

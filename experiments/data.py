@@ -52,6 +52,20 @@ def read(path: Path, *streams: int) -> jflnr.Frame:
     return frame
 
 
+def but(frame: jflnr.Frame, **layers: Any) -> jflnr.Frame:
+    """The frame with other layers."""
+    return dataclasses.replace(frame, **layers)
+
+
+def has(path: Path, spp: int) -> bool:
+    """Whether the frame was rendered with that many samples."""
+    try:
+        jflnr.read_frame(path, spp=spp)
+    except ValueError:
+        return False
+    return True
+
+
 def position(frame: jflnr.Frame, header: dict[str, Any]) -> np.ndarray:
     """World position `(H, W, 3)` from depth and the header's camera (DESIGN.md, "The frame")."""
     depth = np.asarray(frame.depth)[..., 0]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-import importlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from experiments import results
+from experiments.catalogue import experiment
 from jflnr.cluster import each
 
 
@@ -20,5 +20,5 @@ def run(
 
 
 def _one(quick: bool, out: Path, name: str) -> tuple[str, None]:
-    results.run(importlib.import_module(f"experiments.{name}"), quick, out)
+    results.run(experiment(name), quick, out)
     return name, None

@@ -1,4 +1,4 @@
-"""Frames larger than memory: what they take whole and in pieces, and whether a seam shows."""
+"""Frames larger than memory, whole and in pieces; folders of frames."""
 
 from __future__ import annotations
 
@@ -9,19 +9,13 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import jax
-import matplotlib.pyplot as plt
-import numpy as np
-
-import jflnr
-from experiments import crop, data, mosaic, plots, results, resume
-from jflnr.files import replacing
+from experiments import crop, folders, mosaic, plots, resume
+from experiments.results import Parts
 from jflnr.large import memory
-from jflnr.metrics import display, exposure
 
 NAME = "large"
-QUESTION = "What do large frames take, in memory and in time, whole and in pieces?"
-MINUTES = 20
+QUESTION = "What do large frames and folders of frames take, in memory and in time?"
+MINUTES = 25
 
 METHODS = ("flr", "flr-adaptive", "flnr")
 # Pixels of the frames whose memory is measured, and what they may take in pieces.
@@ -42,16 +36,17 @@ print(json.dumps({"code": code, "MB": peak / 1024, "seconds": time.perf_counter(
 """
 
 
-def run(quick: bool) -> dict[str, Any]:
-    """Memory and time by size and method, and crops of the largest frame."""
+def run(quick: bool) -> Parts:
+    """Memory and time by size and method, crops of the largest frame; folders of frames."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if quick:
-            return {"memory": _sizes(folder, "flr", *SIZES[0]), "largest": []}
+            return {"memory": _sizes(folder, "flr", *SIZES[0])} | folders.run(quick)
         keys = [f"{method} {h} {w}" for h, w in SIZES for method in METHODS]
         sizes = resume.rows(NAME, keys, lambda key: _sizes(folder, *_parsed(key)))
         largest = resume.rows(f"{NAME}-largest", CROPPED, lambda method: _largest(folder, method))
-    return {"memory": [row for rows in sizes for row in rows], "largest": largest}
+    found = {"memory": [row for rows in sizes for row in rows], "largest": largest}
+    return found | folders.run(quick)
 
 
 def _parsed(key: str) -> tuple[str, int, int]:
@@ -110,53 +105,7 @@ def measured(arguments: list[str]) -> dict[str, Any]:
     return found
 
 
-def seams(path: Path) -> None:
-    """Whole, in pieces, and in strips that know nothing of each other; below, what differs."""
-    frame = jflnr.read_frame(data.SHIPPED)
-    whole = np.asarray(jflnr.denoise(frame))
-    rows = 48
-    apart = [
-        jflnr.denoise(jax.tree.map(lambda a, top=top: a[top : top + rows], frame))
-        for top in range(0, whole.shape[0], rows)
-    ]
-    tile = int((rows * whole.shape[1]) ** 0.5)
-    pictures = {
-        "whole": whole,
-        f"in pieces (tile={tile})": np.asarray(jflnr.denoise(frame, tile=tile)),
-        "strips apart: what a seam is": np.concatenate(apart),
-    }
-    scale = exposure(whole * frame.albedo)
-    drawing, axes = plt.subplots(2, 3, figsize=(12, 5), layout="constrained")
-    for (top, bottom), (name, light) in zip(axes.T, pictures.items(), strict=True):
-        top.imshow(display(light * frame.albedo, scale))
-        difference = np.abs(light - whole).mean(axis=-1) / whole.mean()
-        bottom.imshow(difference, vmin=0, vmax=0.02, cmap="gray")
-        top.set(title=name, xticks=[], yticks=[])
-        text = f"difference: at most {difference.max():.1g} of the mean (white: 0.02)"
-        bottom.set(xlabel=text, xticks=[], yticks=[])
-    with replacing(path) as beside:
-        drawing.savefig(beside, dpi=80, format="png")
-    plt.close(drawing)
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """large.png: memory and time by size; large_seams.png; large_figures.md."""
-    seams(folder / f"{NAME}_seams.png")
-    columns = {"method": "method", "way": "denoised", "megapixels": "megapixels"}
-    taken = {"MB": "peak memory, MB", "seconds": "seconds", "cpu": "processor seconds"}
-    text = results.table(result["memory"], columns | taken)
-    if result["largest"]:
-        text += f"\nIn pieces, `--memory {LARGEST_MEMORY}`, and a crop where pieces meet:\n\n"
-        found = {"difference": "against the whole", "largest": "largest, of the mean"}
-        columns = {"method": "method", "megapixels": "megapixels"}
-        text += results.table(result["largest"], columns | taken | found)
-    plots.write_text(folder / f"{NAME}_figures.md", text)
-    with plots.figure(folder / f"{NAME}.png", columns=2, size=(5, 3.8)) as axes:
-        for axis, key in zip(axes, ("MB", "seconds"), strict=True):
-            for method in dict.fromkeys(row["method"] for row in result["memory"]):
-                for way, style in (("whole", "o-"), ("in pieces", "s--")):
-                    rows = [r for r in result["memory"] if (r["method"], r["way"]) == (method, way)]
-                    x, y = [r["megapixels"] for r in rows], [r[key] for r in rows]
-                    axis.plot(x, y, style, label=f"{method}, {way}")
-            axis.set(xlabel="megapixels", ylabel=taken[key], ylim=(0, None))
-        axes[0].legend(fontsize=7)
+def charts(parts: Parts, folder: Path) -> None:
+    """large.png: memory and time by size."""
+    rows = [row | {"case": f"{row['method']}, {row['way']}"} for row in parts["memory"]]
+    plots.lines(folder / f"{NAME}.png", rows, x="megapixels", y=("MB", "seconds"), by="case")

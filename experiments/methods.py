@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jflnr
-from experiments.gain import figure3
-from experiments.peers import atrous, bmfr, guided, svgf
+from experiments.peers import atrous, bmfr, figure3, guided, svgf
 from jflnr.frame import Array, Frame
 
 Denoiser = Callable[..., Array]
@@ -115,5 +114,20 @@ def basic() -> list[Method]:
     """The noisy input and the paper's Figure 3."""
     return [
         Method("noisy", "input", noisy, {}, False),
-        Method("Figure 3", "Figure 3", figure3, {}, False),
+        Method("Figure 3", "Figure 3", figure3.denoise, {}, False),
     ]
+
+
+FAMILIES = (
+    "OIDN",
+    "guided filter",
+    "BMFR, one frame",
+    "fast guided filter",
+    "SVGF, spatial",
+    "a-trous",
+)
+
+
+def family(method: str) -> str:
+    """Whose a method of this name is."""
+    return next((name for name in FAMILIES if method.startswith(name)), "jflnr")

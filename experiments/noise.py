@@ -36,12 +36,12 @@ def _rendered(path: Path, counts: tuple[int, ...], realisations: int) -> dict[st
     label = "-".join(map(str, (path.parent.name, path.stem, *counts, realisations)))
     kept = FOLDER / f"{label}.npz"
     if not kept.exists():
-        from experiments.render import backend
+        from experiments.rendering import backend
 
         backend.start()
-        from experiments.render import frame
-        from experiments.render.source import load
-        from experiments.render.tracer import Tracer
+        from experiments.rendering import frame
+        from experiments.rendering.source import load
+        from experiments.rendering.tracer import Tracer
         from jflnr.camera import Camera
         from jflnr.files import replacing
 

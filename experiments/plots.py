@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-from matplotlib.axes import Axes
 
 from jflnr.files import replacing, write_atomically
 
@@ -36,19 +36,74 @@ def figure(
     plt.close(drawing)
 
 
-def power_law(axis: Axes, rows: list[dict[str, Any]], key: str, label: str) -> None:
-    """Time against `key` on log axes, with the proportional line through the last point."""
-    x, y = [row[key] for row in rows], [row["ms"] for row in rows]
-    axis.loglog(x, y, "o-", label="measured")
-    axis.loglog(x, [y[-1] * v / x[-1] for v in x], "--", label="proportional")
-    axis.set(xlabel=label, ylabel="milliseconds")
-    axis.legend()
+MARKS = "osD^vPX*<>"
+LABELS = {
+    "psnr": "PSNR, dB",
+    "ssim": "SSIM",
+    "flip": "FLIP (less is better)",
+    "rmse": "rMSE",
+    "smape": "SMAPE",
+    "ms": "milliseconds",
+    "spp": "samples per pixel",
+    "block": "block, pixels on a side",
+}
 
 
-def against(axis: Axes, rows: list[dict[str, Any]], key: str, label: str) -> None:
-    """Time against `key` on linear axes from zero."""
-    axis.plot([row[key] for row in rows], [row["ms"] for row in rows], "o-")
-    axis.set(xlabel=label, ylabel="milliseconds", ylim=(0, None))
+def lines(
+    path: Path, rows: list[dict[str, Any]], x: str, y: tuple[str, ...], by: str, most: int = 10
+) -> None:
+    """A panel for each of `y` over `x`, a line for each value of `by`."""
+    with figure(path, columns=len(y), size=(5.5, 4.6)) as found:
+        axes = np.atleast_1d(found)
+        for axis, key in zip(axes, y, strict=True):
+            for number, name in enumerate(list(dict.fromkeys(row[by] for row in rows))[:most]):
+                mine = [row for row in rows if row[by] == name and key in row]
+                mine.sort(key=lambda row: row[x])
+                style = MARKS[number] + ("-" if number < len(COLOURS) else "--")
+                axis.plot([row[x] for row in mine], [row[key] for row in mine], style, label=name)
+            ticks = sorted({row[x] for row in rows})
+            axis.set(xscale="log", xlabel=LABELS.get(x, x), ylabel=LABELS.get(key, key))
+            axis.set_xticks(ticks, map(str, ticks))
+            axis.minorticks_off()
+        axes[0].legend(fontsize=8)
+
+
+def scatter(path: Path, rows: list[dict[str, Any]]) -> None:
+    """PSNR against time, the front drawn and named. rows: method, family, psnr, ms."""
+    rows = sorted(rows, key=lambda row: row["ms"])
+    best = front([(row["ms"], row["psnr"]) for row in rows])
+    with figure(path, size=(9.5, 6.2)) as axis:
+        for number, family in enumerate(dict.fromkeys(row["family"] for row in rows)):
+            mine = [row for row in rows if row["family"] == family]
+            x, y = [row["ms"] for row in mine], [row["psnr"] for row in mine]
+            axis.plot(x, y, MARKS[number], label=family, alpha=0.8)
+        points = [(rows[index]["ms"], rows[index]["psnr"]) for index in best]
+        axis.plot(*np.transpose(points), "k-", lw=0.8, zorder=0)
+        for number, point in enumerate(points, 1):
+            axis.annotate(str(number), point, xytext=(-4, 5), textcoords="offset points")
+        # Numbers, named in a box: labels would overlap.
+        names = [f"{number}  {rows[index]['method']}" for number, index in enumerate(best, 1)]
+        place = {"transform": axis.transAxes, "va": "bottom", "fontsize": 8}
+        box = {"fc": "white", "alpha": 0.8}
+        axis.text(0.01, 0.02, "\n".join(["Pareto front", *names]), **place, bbox=box)
+        axis.set(xscale="log", xlabel="milliseconds at 640 x 360", ylabel="PSNR at 1 spp, dB")
+        # The worst are in the table; they would flatten the rest.
+        top = max(row["psnr"] for row in rows)
+        axis.set_ylim(bottom=max(top - 9, min(row["psnr"] for row in rows) - 0.3), top=top + 0.8)
+        axis.legend(loc="lower right", fontsize=8)
+
+
+def front(points: list[tuple[float, float]]) -> list[int]:
+    """Numbers of the points (time, dB) that no other beats in both, fastest first.
+
+    Less than 0.01 dB is no difference: backends round differently.
+    """
+    best, found = -np.inf, []
+    for index in sorted(range(len(points)), key=lambda i: (points[i][0], -points[i][1])):
+        if points[index][1] > best + 0.01:
+            best = points[index][1]
+            found.append(index)
+    return found
 
 
 def write_text(path: Path, text: str) -> None:

@@ -42,7 +42,7 @@ def forget(name: str) -> None:
 
 def code_version() -> str:
     """A digest of the code that results depend on."""
-    code = ("jflnr/**/*.py", "experiments/*.py", "experiments/peers/*.py")
+    code = ("jflnr/**/*.py", "experiments/**/*.py")
     patterns = (*code, "kernels_cl/**/*.cl", "kernels_cl/**/*.h")
     digest = hashlib.sha256()
     for path in sorted(path for pattern in patterns for path in ROOT.glob(pattern)):

@@ -10,8 +10,8 @@ import numpy as np
 
 import jflnr
 from experiments.methods import Method, backends
-from jflnr.regression.parameters import DEFAULT, Parameters
 from jflnr.frame import Frame
+from jflnr.regression.flr import DEFAULT, FLR
 
 GUIDES = (("normal", "depth"), ("normal", "depth", "ao", "position"))
 
@@ -21,7 +21,7 @@ def flr_settings() -> list[Method]:
     options: dict[str, dict[str, Any]] = {f"block {b}": {"block": b} for b in (1, 2, 4, 16, 32)}
     options |= {f"guides {'+'.join(names)}": {"guides": names} for names in GUIDES}
     for sigma in (8.0, 24.0):
-        changed = Parameters.of(sigma, float(DEFAULT.eps), float(DEFAULT.eps_prime))
+        changed = FLR(sigma, float(DEFAULT.eps), float(DEFAULT.eps_prime))
         options[f"sigma {sigma:g}"] = {"parameters": changed}
     found = []
     for backend in backends():

@@ -1,11 +1,9 @@
-"""Time of FLR against the memory floor and against OIDN, and how it grows."""
+"""Time of a frame, alone and with a history, against the memory floor; how it grows."""
 
 from __future__ import annotations
 
 import functools
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -13,19 +11,25 @@ import jax.numpy as jnp
 import numpy as np
 
 import jflnr
-from experiments import data, plots, results
-from jflnr import opencl
+from experiments import data
+from experiments.methods import backends
+from experiments.peers import guided, svgf
+from experiments.results import Parts, Row
+from experiments.shots import made_up
+from experiments.timing import interleaved
+from jflnr import opencl, temporal
+from jflnr.frame import Frame
+from jflnr.images.guides import layers
 from jflnr.network import weights
-from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.regression.parameters import DEFAULT
-from jflnr.regression.flr import flr
-from jflnr.guides import layers
 from jflnr.opencl.context import default_context
 from jflnr.opencl.profile import profile
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.flr import DEFAULT, flr
+from jflnr.temporal import bmfr, bmfr_fit, sequence
 
 NAME = "speed"
-QUESTION = "How many times the memory floor does FLR take, and how much less than OIDN?"
-MINUTES = 7
+QUESTION = "What does a frame take, against the memory floor and others, and how does it grow?"
+MINUTES = 13
 
 WIDTH, HEIGHT = 1920, 1080
 OIDN: dict[str, dict[str, Any]] = {
@@ -36,33 +40,37 @@ OIDN: dict[str, dict[str, Any]] = {
 # Methods whose kernels are timed by themselves too, and their constants.
 OPENCL: dict[str, tuple[Callable[..., Any], Any]] = {
     "flr": (opencl.flr, DEFAULT),
-    "flr-adaptive": (opencl.flr_adaptive, ADAPTIVE_DEFAULT),
+    "flr-adaptive": (opencl.flr_adaptive, AdaptiveFLR()),
     "flnr": (opencl.flnr, weights.shipped("flnr")),
 }
 
 
-def run(quick: bool) -> dict[str, Any]:
-    """Milliseconds at 1920 x 1080, five guides, block 8; growth with pixels, guides, channels."""
-    repeats = 3 if quick else 15
+def run(quick: bool) -> Parts:
+    """Milliseconds of frames and of frames of sequences, and how they grow; memory, kernels."""
     frame = enlarge(jflnr.read_frame(data.frames("test")[0]), HEIGHT, WIDTH)
-    methods = methods_on(frame)
-    seconds = interleaved(methods, repeats)
+    size = (90, 160) if quick else (720, 1280)
+    repeats = 3 if quick else 15
+    found = {
+        "frames of 1920 x 1080": timed(methods_on(frame), "flr, JAX", repeats),
+        "memory": [memory()],
+        "kernels, 1920 x 1080": kernels(frame),
+        "frames of sequences, 1280 x 720": timed(over_time(*size), "BMFR, JAX", repeats),
+    }
+    counts, sizes = ((2, 5), (0.05,)) if quick else ((1, 3, 5, 9, 14), (0.23, 3.69))
+    base = sizes[0] if quick else 0.92
+    grown = [growth(base, guides, quick) for guides in counts]
+    grown += [growth(megapixels, 5, quick) for megapixels in sizes]
+    return found | {"growth": [row for rows in grown for row in rows]}
+
+
+def timed(calls: dict[str, Callable[[], Any]], basis: str, repeats: int) -> list[Row]:
+    """Milliseconds of each, also by the memory floor and by one of them."""
+    seconds = interleaved(calls, repeats)
     floor = seconds["memory floor"]
-    rows: list[dict[str, Any]] = [
-        {"method": name, "ms": 1e3 * t, "floors": t / floor, "per_flr": t / seconds["flr, JAX"]}
+    return [
+        {"method": name, "ms": 1e3 * t, "floors": t / floor, f"x {basis}": t / seconds[basis]}
         for name, t in seconds.items()
     ]
-    for row in rows:
-        print(f"  {row['method']}: {row['ms']:.1f} ms, {row['floors']:.1f} x the floor", flush=True)
-    sizes = (0.25, 1, 2) if quick else (0.25, 0.5, 1, 2, 4, 8, 16, 33)
-    return {
-        "methods": rows,
-        "memory": memory(),
-        "kernels": kernels(frame),
-        "pixels": [growth(megapixels=size) for size in sizes],
-        "guides": [growth(guides=q) for q in ((0, 5) if quick else (0, 1, 2, 3, 5, 8, 12))],
-        "channels": light_groups((3, 9) if quick else (3, 6, 9, 15)),
-    }
 
 
 def methods_on(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
@@ -119,19 +127,6 @@ def oidn_calls(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
     return {name: filter_for(frame, **options) for name, options in OIDN.items()}
 
 
-def interleaved(calls: dict[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
-    """The best time of each call in seconds, taken in turns so that all meet the same machine."""
-    best = dict.fromkeys(calls, float("inf"))
-    for call in calls.values():
-        call()
-    for _ in range(repeats):
-        for name, call in calls.items():
-            start = time.perf_counter()
-            call()
-            best[name] = min(best[name], time.perf_counter() - start)
-    return best
-
-
 def synthetic(megapixels: float, guides: int, channels: int) -> tuple[jax.Array, jax.Array]:
     """Random images of 16 : 9."""
     height = round((megapixels * 1e6 * 9 / 16) ** 0.5 / 8) * 8
@@ -141,29 +136,33 @@ def synthetic(megapixels: float, guides: int, channels: int) -> tuple[jax.Array,
     return jnp.asarray(generator.random((height, width, channels), np.float32)), jnp.asarray(x)
 
 
-def growth(megapixels: float = 2.0736, guides: int = 5, channels: int = 3) -> dict[str, Any]:
-    """Time of compiled FLR on one size."""
-    y, x = synthetic(megapixels, guides, channels)
-    compiled = jax.jit(flr)
-    call = lambda: compiled(y, x, DEFAULT).block_until_ready()
-    seconds = interleaved({"flr": call}, 7)["flr"]
-    return {
-        "megapixels": y.shape[0] * y.shape[1] / 1e6,
-        "guides": guides,
-        "channels": channels,
-        "ms": 1e3 * seconds,
+def growth(megapixels: float, guides: int, quick: bool) -> list[Row]:
+    """FLR, BMFR's QR and the guided filter on random images of one size, all compiled by JAX."""
+    y, x = synthetic(megapixels, guides, 3)
+    weight = jnp.ones_like(y[..., :1])
+    calls: dict[str, Callable[[], Any]] = {
+        "flr": lambda: _flr(y, x, DEFAULT).block_until_ready(),
+        "bmfr": lambda: _bmfr(y, x).block_until_ready(),
+        "guided": lambda: _guided(y, x, weight).block_until_ready(),
     }
+    about = {"guides": guides, "megapixels": y.shape[0] * y.shape[1] / 1e6}
+    seconds = interleaved(calls, 1 if quick else 4)
+    return [{"method": name, **about, "ms": 1e3 * t} for name, t in seconds.items()]
 
 
-def light_groups(counts: tuple[int, ...]) -> list[dict[str, Any]]:
-    """Light groups denoised together, against as many separate runs of three channels."""
-    alone = growth(channels=3)["ms"]
-    rows = []
-    for channels in counts:
-        together = growth(channels=channels)["ms"]
-        separate = alone * channels / 3
-        rows.append({"groups": channels // 3, "together": together, "separate": separate})
-    return rows
+_flr = jax.jit(flr)
+
+
+@jax.jit
+def _bmfr(y: jax.Array, x: jax.Array) -> jax.Array:
+    surface = jnp.ones_like(y[..., :1], bool)
+    return bmfr_fit.fit(y, x, surface, 0, jnp.zeros(2, int))
+
+
+@jax.jit
+def _guided(y: jax.Array, x: jax.Array, weight: jax.Array) -> jax.Array:
+    slopes, offset = guided.models(x, y, weight, 24, 0.01)
+    return guided.evaluate(slopes, offset, x)
 
 
 def memory() -> dict[str, float]:
@@ -190,22 +189,42 @@ def enlarge(frame: jflnr.Frame, height: int, width: int) -> jflnr.Frame:
     return jax.tree.map(repeat, frame)
 
 
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """speed.md, and speed.png with the growth in pixels and guides."""
-    columns = {"method": "method", "ms": "ms", "floors": "x floor", "per_flr": "x FLR (JAX)"}
-    text = results.table(result["methods"], columns)
-    text += "\n" + results.table([result["memory"]], {key: key for key in result["memory"]})
-    groups = {"groups": "light groups", "together": "together, ms", "separate": "separately, ms"}
-    text += "\n" + results.table(result["channels"], groups)
-    kernel_columns = {
-        "method": "method",
-        "kernel": "kernel",
-        "ms": "ms",
-        "mb": "MB",
-        "share": "share of copy bandwidth",
-    }
-    text += "\n" + results.table(result["kernels"], kernel_columns)
-    plots.write_text(folder / f"{NAME}.md", text)
-    with plots.figure(folder / f"{NAME}.png", columns=2) as (left, right):
-        plots.power_law(left, result["pixels"], "megapixels", "frame size, megapixels")
-        plots.against(right, result["guides"], "guides", "guides Q")
+def over_time(height: int, width: int) -> dict[str, Callable[[], Any]]:
+    """Name to a call that denoises the second frame of a sequence."""
+    before, now = (enlarge(frame, height, width) for frame in made_up(2).frames)
+    return by_kernels(before, now) | by_jax(before, now)
+
+
+def by_jax(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
+    """Name to a call that denoises `now` after `before`, and waits; and the memory floor."""
+    source = np.ones((*now.depth.shape[:2], 8), np.float32)  # five guides and the light
+    target = np.zeros_like(source)
+    found: dict[str, Callable[[], Any]] = {"memory floor": lambda: np.copyto(target, source)}
+    frames = [jax.tree.map(jnp.asarray, frame) for frame in (before, now)]
+    for method in sequence.METHODS:
+        step = functools.partial(temporal.step, method=method)
+        found[f"{method}, temporal, JAX"] = second(temporal.start, step, *frames)
+    found["BMFR, JAX"] = second(bmfr.start, bmfr.step, *frames)
+    return found | {"SVGF, JAX": second(svgf.start, svgf.step, *frames)}
+
+
+def by_kernels(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
+    """The same by the kernels, if there is a device."""
+    found: dict[str, Callable[[], Any]] = {}
+    if "opencl" in backends():
+        from jflnr.opencl import bmfr as bmfr_kernels
+        from jflnr.opencl import temporal as kernels
+
+        for method in sequence.METHODS:
+            step = functools.partial(kernels.step, method=method)
+            found[f"{method}, temporal, OpenCL"] = second(kernels.start, step, before, now)
+        found["BMFR, OpenCL"] = second(bmfr_kernels.start, bmfr_kernels.step, before, now)
+    return found
+
+
+def second(
+    start: Callable[[Frame], Any], step: Callable[..., Any], before: Frame, now: Frame
+) -> Callable[[], Any]:
+    """A call of the step from the first frame to the second."""
+    state = jax.block_until_ready(step(start(before), before)[0])
+    return functools.partial(finished, functools.partial(step, state, now))

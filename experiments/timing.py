@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import jflnr
 from experiments.methods import Method
-from experiments.speed import interleaved
 
 REPEATS = 15
 
@@ -19,3 +20,16 @@ def times(methods: Sequence[Method], frame: jflnr.Frame, quick: bool) -> dict[st
     calls = {method.name: method.prepare(frame) for method in methods}
     seconds = interleaved(calls, 1 if quick else REPEATS)
     return {name: 1e3 * t for name, t in seconds.items()}
+
+
+def interleaved(calls: dict[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
+    """The best time of each call in seconds, taken in turns so that all meet the same machine."""
+    best = dict.fromkeys(calls, float("inf"))
+    for call in calls.values():
+        call()
+    for _ in range(repeats):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
-from experiments import data, plots, results, resume
+from experiments import data, resume
 from experiments.methods import Denoiser
 from experiments.peers import atrous, bmfr, guided, svgf
 from experiments.settings import oidn_settings
@@ -78,19 +77,19 @@ def run(quick: bool) -> dict[str, Any]:
                     continue
                 trial = best | {key: value}
                 score = mean_psnr(frames, denoiser, trial)
-                tried.append({"peer": name, "parameters": trial, "psnr": score})
+                tried.append({"peer": name, "parameters": str(trial), "psnr": score})
                 if score > found:
                     best, found = trial, score
-        return [{"peer": name, "parameters": best, "psnr": found, "tried": tried}]
+        return [*tried, {"peer": name, "parameters": f"best: {best}", "psnr": found}]
 
-    chosen = [
+    tried = [
         row for rows in resume.rows(f"{NAME}{'-quick' * quick}", names, search) for row in rows
     ]
     oidn = [
         {"peer": m.name, "psnr": mean_psnr(frames, m.denoise, m.parameters)}
         for m in (oidn_settings()[:1] if quick else oidn_settings())
     ]
-    return {"chosen": chosen, "oidn": oidn}
+    return {"tried": tried, "OIDN": oidn}
 
 
 def middle(frame: Frame) -> Frame:
@@ -112,12 +111,3 @@ def quick_psnr(frame: Frame, indirect: Any) -> float:
     x = albedo * np.asarray(indirect, np.float64)
     scale = exposure(y)
     return psnr(display(x, scale), display(y, scale))
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """tune.md: the chosen parameters, and OIDN's settings."""
-    text = results.table(
-        result["chosen"], {"peer": "peer", "parameters": "best parameters", "psnr": "PSNR, val"}
-    )
-    text += "\n" + results.table(result["oidn"], {"peer": "setting", "psnr": "PSNR, val"})
-    plots.write_text(folder / f"{NAME}.md", text)

@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.peers.windows import over_offsets, square
 from jflnr.frame import Array, Frame
-from jflnr.guides import layers
+from jflnr.images.guides import layers
 
 # The paper leaves the widths to the user. These are those of its listing's order of magnitude,
 # the colour's being halved at every level.

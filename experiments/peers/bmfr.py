@@ -11,10 +11,10 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jflnr.temporal.bmfr_fit import fit
 
 from jflnr.frame import Array, Frame
-from jflnr.guides import layers
-from jflnr.temporal.bmfr_fit import fit
+from jflnr.images.guides import layers
 
 PAPER: dict[str, Any] = {
     "features": ("normal", "position", "position2"),

@@ -9,8 +9,9 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.results import Parts
 from experiments.stability import drawing, fireflies
-from experiments.stability.cases import CASES, Case, Type, make
+from experiments.stability.cases import CASES, Type, make
 from experiments.stability.measures import measure, passes
 from experiments.stability.methods import EXACT, METHODS, ON_DEVICE, OURS, TRUTHS, Method, exists
 
@@ -28,7 +29,7 @@ PRECISIONS: dict[str, tuple[Type, Type]] = {
 }
 
 
-def run(quick: bool) -> dict[str, Any]:
+def run(quick: bool) -> Parts:
     """One row per case, precision and method: the figures of `measures.measure`."""
     precisions = ["float32"] if quick else list(PRECISIONS)
     skipped = {"ours, block inverse"} if quick else set()
@@ -43,9 +44,10 @@ def run(quick: bool) -> dict[str, Any]:
         bad = [f"{r['method']} {r['precision']}" for r in rows if r["case"] == case and misses(r)]
         print(f"  {case}: {'ours misses the bar: ' + ', '.join(bad) if bad else 'ok'}", flush=True)
     return {
+        "cells that clear the bar": drawing.counts(rows),
+        "robust fits, made up": fireflies.run(quick),
+        "robust fits, real frames": fireflies.real(quick),
         "cells": rows,
-        "fireflies": fireflies.run(quick),
-        "real fireflies": fireflies.real(quick),
     }
 
 
@@ -82,16 +84,6 @@ def _opencl_works() -> bool:
     return True
 
 
-def picture(method: str, case: str) -> tuple[Case, np.ndarray]:
-    """A case in float32 and what a method makes of it, `(H, W)`."""
-    made = make(case, *SIZE, np.float32)
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore", RuntimeWarning)
-        return made, METHODS[method](made, np.float32)[..., 0]
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """stability.png (heat map), stability_failures.png, stability_table.md."""
-    drawing.heat_map(result["cells"], folder / "stability.png")
-    drawing.failures(result["cells"], picture, folder / "stability_failures.png")
-    drawing.tables(result, folder / "stability_table.md")
+def charts(parts: Parts, folder: Path) -> None:
+    """The heat map."""
+    drawing.heat_map(parts["cells"], folder / f"{NAME}.png")

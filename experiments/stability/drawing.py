@@ -1,8 +1,7 @@
-"""The heat map of the atlas, the pictures of its failures, its tables."""
+"""The heat map of the atlas, and its counts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,25 +10,14 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Patch, Rectangle
 
-from experiments import plots, results
-from experiments.stability.cases import CASES, Case
+from experiments import plots
+from experiments.stability.cases import CASES
 from experiments.stability.measures import ERROR_BAR, OVERSHOOT_BAR, passes
 from experiments.stability.methods import METHODS, OURS
 
 Row = dict[str, Any]
 WORST = 1e4
 BLACK, EMPTY = "#000000", "#dddddd"
-COLUMNS = {
-    "case": "case",
-    "precision": "precision",
-    "method": "method",
-    "not_finite": "NaN or Inf, pixels",
-    "error": "error, times the exact",
-    "rounding": "off its own truth",
-    "overshoot": "overshoot",
-    "bias": "bias",
-    "bleeding": "bleeding",
-}
 
 
 def heat_map(cells: list[Row], path: Path) -> None:
@@ -50,7 +38,7 @@ def heat_map(cells: list[Row], path: Path) -> None:
                     axis.add_patch(
                         Rectangle(corner, 1, height, color=_colour(cell, scale, colours))
                     )
-                    if cell and cell["error"] and (cell["overshoot"] or 0) > OVERSHOOT_BAR:
+                    if cell and cell.get("error") and (cell.get("overshoot") or 0) > OVERSHOOT_BAR:
                         axis.plot(x + 0.5, y + (k + 0.5) * height, "k.", markersize=4)
         for x in range(len(CASES) + 1):
             axis.axvline(x, color="white", linewidth=2.5)
@@ -84,78 +72,13 @@ def heat_map(cells: list[Row], path: Path) -> None:
 def _colour(cell: Row | None, scale: Any, colours: Any) -> Any:
     if cell is None:
         return EMPTY
-    if cell["not_finite"] or cell["error"] is None:
+    if cell["not_finite"] or cell.get("error") is None:
         return BLACK
     return colours(scale(np.clip(cell["error"], 1, WORST)))
 
 
-def failures(
-    cells: list[Row], picture: Callable[[str, str], tuple[Case, np.ndarray]], path: Path
-) -> None:
-    """For every method that fails in float32, its results on up to four such cases, and ours."""
-    bad: dict[str, list[str]] = {}
-    for cell in cells:
-        if cell["precision"] == "float32" and not passes(cell) and cell["method"] not in OURS:
-            bad.setdefault(cell["method"], []).append(cell["case"])
-    shown = _most_telling(bad)
-    methods = [*(m for m in METHODS if m in bad), "ours, Cholesky"]
-    with plots.figure(path, columns=len(shown), size=(1.9, 1.75 * (len(methods) + 1))) as axes:
-        for axis, case in zip(axes, shown, strict=True):
-            axis.set_axis_off()
-            axis.set_title(case, fontsize=10)
-            made, _ = picture("ours, Cholesky", case)
-            light = made.target[..., 1].astype(np.float64)
-            low, high = float(light.min()), float(max(light.max(), light.min() + 1e-30))
-            images = [made.target[..., 0].astype(np.float64)]
-            images += [picture(method, case)[1].astype(np.float64) for method in methods]
-            for i, (name, image) in enumerate(zip(["input", *methods], images, strict=True)):
-                inset = axis.inset_axes((0.02, 1 - (i + 1) / len(images), 0.96, 0.86 / len(images)))
-                inset.imshow(_painted(image, low, high))
-                inset.set(xticks=[], yticks=[])
-                inset.grid(False)
-                inset.set_title(name, fontsize=8, pad=2)
-
-
-def _most_telling(bad: dict[str, list[str]], most: int = 6) -> list[str]:
-    """The cases that fail most methods, in the order of the atlas."""
-    count = {case: sum(case in cases for cases in bad.values()) for case in CASES}
-    chosen = sorted(count, key=lambda case: -count[case])[:most]
-    return [case for case in CASES if case in chosen]
-
-
-def _painted(image: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Grey from `low` to `high` of the true light; magenta NaN or Inf, blue below, red above."""
-    with np.errstate(all="ignore"):
-        grey = 0.15 + 0.7 * np.clip((image - low) / (high - low), 0, 1)
-    rgb = np.repeat(np.nan_to_num(grey)[..., None], 3, -1)
-    far = 2 * (high - low)
-    rgb[image > high + far] = (0.84, 0.1, 0.1)
-    rgb[image < low - far] = (0.1, 0.3, 0.85)
-    rgb[~np.isfinite(image)] = (0.9, 0.2, 0.9)
-    return rgb
-
-
-def tables(result: dict[str, Any], path: Path) -> None:
-    """A count per method, the robust fits, and the figures of float32 and float16."""
-    cells = result["cells"]
-    text = "Cells that clear the bar, of all cases:\n\n" + results.table(*_counts(cells))
-    columns = {"spp": "spp", "fit": "fit", "typical": "median error", "error": "error"}
-    text += "\nRobust fits under heavy-tailed noise, relative to the mean light:\n\n"
-    text += results.table(result["fireflies"], columns | {"bias": "bias"})
-    text += "\nThe same on real frames, of the brightness:\n\n"
-    real = result["real fireflies"]
-    text += results.table(real, {"frame": "frame"} | columns | {"bias": "bias"})
-    text += "\nEvery cell of float32 and float16 (the others are in stability.json):\n\n"
-    some = [c for c in cells if c["precision"] in ("float32", "float16")]
-    shown = [{k: "NaN" if v is None and k in _LOST else v for k, v in c.items()} for c in some]
-    text += results.table([{k: v for k, v in c.items() if v is not None} for c in shown], COLUMNS)
-    plots.write_text(path, text)
-
-
-_LOST = ("error", "rounding", "overshoot", "bias")
-
-
-def _counts(cells: list[Row]) -> tuple[list[Row], dict[str, str]]:
+def counts(cells: list[Row]) -> list[Row]:
+    """How many cells clear the bar, methods down and precisions across."""
     precisions = list(dict.fromkeys(c["precision"] for c in cells))
     rows = []
     for method in dict.fromkeys(c["method"] for c in cells):
@@ -164,4 +87,4 @@ def _counts(cells: list[Row]) -> tuple[list[Row], dict[str, str]]:
             some = [c for c in cells if (c["method"], c["precision"]) == (method, precision)]
             row[precision] = f"{sum(map(passes, some))} of {len(some)}" if some else "-"
         rows.append(row)
-    return rows, {name: name for name in ("method", *precisions)}
+    return rows

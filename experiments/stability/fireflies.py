@@ -12,9 +12,8 @@ import jflnr
 from experiments import data
 from experiments.stability.cases import room
 from experiments.stability.methods import SUPPORT
-from jflnr.regression.parameters import DEFAULT
-from jflnr.regression.flr import flr
-from jflnr.guides import choose, layers
+from jflnr.images.guides import choose, layers
+from jflnr.regression.flr import DEFAULT, flr
 
 SIZE = 36, 44
 PROBABILITY, ENERGY = 5e-5, 0.2  # of a firefly per sample; its share of the other light

@@ -15,10 +15,8 @@ from experiments.stability import solvers
 from experiments.stability.cases import Case, Type
 from jflnr.network.flnr import flnr
 from jflnr.network.weights import shipped
-from jflnr.regression.adaptive import flr_adaptive
-from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.regression.parameters import DEFAULT
-from jflnr.regression.flr import flr
+from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
+from jflnr.regression.flr import DEFAULT, flr
 from jflnr.temporal import bmfr_fit
 
 BLOCK = 8
@@ -97,7 +95,7 @@ def _in_jax(program: Callable[..., jax.Array], case: Case, dtype: Type) -> np.nd
 
 @functools.cache
 def _adaptive() -> Callable[..., jax.Array]:
-    return unoptimised(lambda y, x, usable: flr_adaptive(y, x, ADAPTIVE_DEFAULT, weight=usable))
+    return unoptimised(lambda y, x, usable: flr_adaptive(y, x, AdaptiveFLR(), weight=usable))
 
 
 def by_adaptive(case: Case, dtype: Type) -> np.ndarray:
@@ -142,7 +140,7 @@ def by_adaptive_opencl(case: Case, dtype: Type) -> np.ndarray:
     from jflnr.opencl import flr_adaptive as on_device
 
     target = np.ascontiguousarray(case.target)
-    return on_device(target, case.guides, ADAPTIVE_DEFAULT, weight=case.usable)
+    return on_device(target, case.guides, AdaptiveFLR(), weight=case.usable)
 
 
 METHODS: dict[str, Method] = {

@@ -28,42 +28,44 @@ def write_report(
     scenes: Sequence[Scene],
     title: str,
     tables: Sequence[Mapping[str, Any]] = (),
-    chart: Mapping[str, Any] | None = None,
+    extra: str = "",
 ) -> None:
     """Write one HTML file that needs no other, atomically.
 
     tables: more tables, each `{"title", "note", "columns": {key: heading}, "rows": [{...}]}`.
-    chart: `{"title", "x": key, "rows": [{"method", "family", key: number, ...}]}`, drawn against
-    any metric that the rows have.
+    extra: HTML that is put before these tables; its scripts may use the page's functions once the
+    page is loaded.
     """
     content = {
         "scenes": [scene_data(scene) for scene in scenes],
         "tables": list(tables),
-        "chart": chart,
         "labels": LABELS | {"ms": "ms"},
         "lower": LOWER_IS_BETTER,
         "epsilon": RELATIVE_EPSILON,
     }
-    write_atomically(path, page(title, content).encode())
+    write_atomically(path, page(title, content, extra).encode())
 
 
-def page(title: str, content: Mapping[str, Any]) -> str:
+def page(title: str, content: Mapping[str, Any], extra: str) -> str:
     """The template with styles, scripts and data put in."""
     folder = files("jflnr.report") / "page"
 
     def read(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
-    # JavaScript, not JSON: NaN and Infinity stay. No "<": nothing can end the script early.
-    data = json.dumps(content).replace("<", "\\u003c")
     parts = {
         "STYLE": read("style.css"),
-        "CHART": read("chart.umd.min.js") if content["chart"] else "",
+        "EXTRA": extra,
         "SCRIPT": "\n".join(map(read, SCRIPTS)),
         "TITLE": html.escape(title),
-        "DATA": data,
+        "DATA": script_data(content),
     }
     return re.sub("%%([A-Z]+)%%", lambda mark: parts[mark[1]], read("page.html"))
+
+
+def script_data(content: Mapping[str, Any]) -> str:
+    """JavaScript, not JSON: NaN and Infinity stay. No "<": nothing can end the script early."""
+    return json.dumps(content).replace("<", "\\u003c")
 
 
 def scene_data(scene: Scene) -> dict[str, Any]:

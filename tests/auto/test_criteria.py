@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments import criteria
+from experiments.auto import criteria
 
 
 @pytest.fixture

@@ -1,18 +1,16 @@
 """The machinery of the experiments, and the quick versions of a few of them."""
 
-import json
-
 import numpy as np
 import pytest
 
 import jflnr
 from experiments import data, results, resume, shots
 from experiments.__main__ import main
-from experiments.lightgroups import error_of_sum, grouped
-from experiments.pareto import pareto_front
-from experiments.regularisation import denoised, normalised, tikhonov
-from experiments.upsample import traced_at
-from jflnr.regression.flr import DEFAULT
+from experiments.catalogue import NAMES
+from experiments.peers import tikhonov
+from experiments.plots import front
+from experiments.sweeps import TABLE, grouped, summed, traced_at
+from jflnr.regression.flr import FLR
 
 
 def test_position_from_depth_is_the_layer(data):
@@ -37,7 +35,7 @@ def test_streams_are_weighted_by_their_samples(data):
 
 def test_the_front_holds_what_nothing_beats():
     points = [(1, 20), (2, 25), (2, 24), (3, 22), (4, 30), (0.5, 10), (5, 30)]
-    assert pareto_front(points) == [5, 0, 1, 4]
+    assert front(points) == [5, 0, 1, 4]
 
 
 def test_interrupted_rows_are_not_redone(tmp_path, monkeypatch):
@@ -61,22 +59,20 @@ def test_interrupted_rows_are_not_redone(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_normalised_solver_is_that_of_flr(frame):
-    ours = denoised(frame, normalised, float(DEFAULT.eps), float(DEFAULT.eps_prime))
-    np.testing.assert_allclose(ours, jflnr.denoise(frame), rtol=2e-3)
-
-
 def test_tikhonov_without_and_with_too_much(frame):
     # No regularisation: both are plain least squares. Too much: nothing is left.
-    free = [np.asarray(denoised(frame, s, 1e-9, 1e-9)) for s in (normalised, tikhonov)]
-    assert np.median(np.abs(free[0] - free[1])) < 1e-2
-    assert np.abs(denoised(frame, tikhonov, 1e6, 1e6)).max() < 1e-2
+    plain = jflnr.denoise(frame, parameters=FLR(15.0, 1e-9, 1e-9))
+    free = np.asarray(tikhonov.denoise(frame, eps=1e-9))
+    assert np.median(np.abs(free - np.asarray(plain))) < 3e-2 * np.mean(free)
+    assert np.abs(tikhonov.denoise(frame, eps=1e6)).max() < 1e-2
 
 
 def test_light_groups_are_a_partition(frame):
     parts = grouped(frame, 3).indirect.reshape(24, 40, 3, 3)
     np.testing.assert_allclose(parts.sum(axis=2), frame.indirect, rtol=1e-5)
-    assert error_of_sum(frame, 3, "jax") < 1e-4
+    whole = np.asarray(jflnr.denoise(frame))
+    found = summed(grouped(frame, 3), backend="jax")
+    np.testing.assert_allclose(found, whole, atol=1e-4 * whole.mean())
 
 
 def test_tracing_smaller_keeps_the_light(frame):
@@ -86,28 +82,32 @@ def test_tracing_smaller_keeps_the_light(frame):
 
 
 @pytest.mark.parametrize("name", ["upsample"])
-def test_quick_versions_leave_evidence_and_charts(name, tmp_path, monkeypatch):
+def test_quick_versions_leave_evidence(name, tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "FOLDER", tmp_path / "cache")
     assert main(["run", name, "--quick", "--out", str(tmp_path)]) == 0
-    evidence = json.loads((tmp_path / f"{name}.json").read_bytes())
-    assert evidence["quick"] and evidence["environment"]["versions"]["jax"]
-    assert (tmp_path / f"{name}.png").stat().st_size > 10_000
-    monkeypatch.setattr("experiments.report.scenes", lambda out: [])  # tests/report has those
-    assert main(["report", "--out", str(tmp_path), "--docs", str(tmp_path / "docs")]) == 0
-    assert f"{name}: rows" in (tmp_path / "report.html").read_text()
-    assert (tmp_path / "docs" / f"{name}.md").read_text().startswith("| ")
+    (measured,) = results.read(tmp_path / f"{name}.json")
+    assert measured["quick"] and measured["versions"]["jax"] and measured["commit"]
+    (row, *_) = measured["parts"]["means"]
+    (frame,) = measured["parts"]["PSNR by frame, dB"][:1]
+    assert row["psnr"] == frame[data.label(data.SHIPPED)] and row["ms"] > 0
+
+
+def test_cases_are_told_apart():
+    for sweep in TABLE.values():
+        labels = [tuple(case.labels.items()) for case in sweep.cases()]
+        assert len(set(labels)) == len(labels) > 1, sweep.NAME
+    assert set(TABLE) < set(NAMES)
 
 
 def test_sequences_are_measured_without_any_at_hand(tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "FOLDER", tmp_path / "cache")
     assert main(["run", "sequences", "--quick", "--out", str(tmp_path)]) == 0
-    rows = json.loads((tmp_path / "sequences.json").read_bytes())["result"]["rows"]
-    found = {row["method"]: row for row in rows}
-    alone, over_time = found["flr"], found["flr, temporal"]
-    assert over_time["psnr"] > alone["psnr"] and over_time["warped"] < alone["warped"] / 2
-    assert found["reference"]["warped"] < 1e-6 < found["reference"]["temporal"]
-    assert "| made up | flr, temporal |" in (tmp_path / "sequences_figures.md").read_text()
-    assert (tmp_path / "sequences.png").stat().st_size > 10_000
+    parts = results.parts(results.read(tmp_path / "sequences.json"))
+    of = lambda part: {row["method"]: row["made up"] for row in parts[part]}
+    assert of("PSNR, dB")["flr, temporal"] > of("PSNR, dB")["flr"]
+    flicker = of("warped error x 1000")
+    assert flicker["flr, temporal"] < flicker["flr"] / 2
+    assert flicker["reference"] < 1e-3 < of("temporal error")["reference"]
 
 
 def test_a_made_up_sequence_moves_as_it_says():

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import jflnr
-from experiments import noise, resume, training
+from experiments import noise, resume
 from experiments.__main__ import main
 from experiments.data import SHIPPED
-from experiments.finetune import crops_of
+from experiments.training import shared
+from experiments.training.finetune import crops_of
 from jflnr.network import examples
 from jflnr.network.adam import Adam
 
@@ -25,10 +26,10 @@ def test_descent_counts_its_own_time_and_gives_the_running_mean(monkeypatch):
 
     known = examples.Example(None, None, None, jnp.stack([target, target, target]), None, None)
     clock = iter(np.arange(0, 1000, 0.5))
-    monkeypatch.setattr(training.time, "process_time", lambda: next(clock))
+    monkeypatch.setattr(shared.time, "process_time", lambda: next(clock))
     solver = Adam(bowl, lambda t: 0.05)
     start = {"w": jnp.zeros(2)}
-    found = list(training.descend(solver, start, known, 2, 100.0))
+    found = list(shared.descend(solver, start, known, 2, 100.0))
     seconds, steps, params = found[-1]
     assert found[0] == (0.0, 0, start)
     assert seconds == 100.0 and steps == 200 and len(found) == 16
@@ -52,11 +53,9 @@ def test_crops_to_finetune_on_have_no_reference():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["flnr_spp", "paper_form", "optimisers", "learning_curve", "finetune"]
-)
-def test_quick_versions(name, tmp_path, monkeypatch):
+def test_quick_version(tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "FOLDER", tmp_path / "cache")
-    assert main(["run", name, "--quick", "--out", str(tmp_path)]) == 0
-    assert json.loads((tmp_path / f"{name}.json").read_bytes())["quick"]
-    assert "| --- |" in (tmp_path / f"{name}.md").read_text()
+    assert main(["run", "training", "--quick", "--out", str(tmp_path)]) == 0
+    (measured,) = json.loads((tmp_path / "training.json").read_bytes())
+    assert measured["quick"] and len(measured["parts"]) == 6
+    assert all(rows for rows in measured["parts"].values())

@@ -15,7 +15,7 @@ from jflnr.frame import composite, read_frame
 
 mi = pytest.importorskip("mitsuba", reason="these tests need Mitsuba 3: pip install mitsuba")
 
-from experiments.render import backend  # noqa: E402
+from experiments.rendering import backend  # noqa: E402
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

@@ -11,7 +11,7 @@ import pytest
 HAS_MITSUBA = importlib.util.find_spec("mitsuba") is not None
 
 if HAS_MITSUBA:
-    from experiments.render import backend
+    from experiments.rendering import backend
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -30,7 +30,7 @@ def pytest_ignore_collect(collection_path: Any) -> bool | None:
 @pytest.fixture(scope="session")
 def room() -> Any:
     """The room that ships, loaded: a Source."""
-    from experiments.render.source import load
+    from experiments.rendering.source import load
 
     return load("room")
 
@@ -38,6 +38,6 @@ def room() -> Any:
 @pytest.fixture(scope="session")
 def tracer(room: Any) -> Any:
     """The room's own view at 64 x 36."""
-    from experiments.render.tracer import Tracer
+    from experiments.rendering.tracer import Tracer
 
     return Tracer.of(room.scene, room.own[0], 64, 36)

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import jflnr
-from experiments.render import command, frame
-from experiments.render.dataset import Job, evaluation_jobs, fill, training_jobs
-from experiments.render.manifest import Manifest
-from experiments.render.reference import Accumulator, Goal
-from experiments.render.sequence import BALL, MOVER, Shot
-from experiments.render.splits import TEST, VAL
-from experiments.render.tracer import Tracer
+from experiments.rendering import command, frame
+from experiments.rendering.dataset import Job, evaluation_jobs, fill, training_jobs
+from experiments.rendering.manifest import Manifest
+from experiments.rendering.reference import Accumulator, Goal
+from experiments.rendering.sequence import BALL, MOVER, Shot
+from experiments.rendering.splits import TEST, VAL
+from experiments.rendering.tracer import Tracer
 from jflnr.exr import read_attributes, read_channels, write_channels
 
 SMALL = ["--width", "48", "--height", "27", "--reference-spp", "64", "--direct-spp", "8"]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.render.source import load, shared_frames, shared_scenes
-from experiments.render.tracer import Tracer
+from experiments.rendering.source import load, shared_frames, shared_scenes
+from experiments.rendering.tracer import Tracer
 from jflnr.camera import Camera
 from jflnr.exr import read_attributes, read_channels
 

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from experiments.render.sampling import Independent, Stratified, sobol_2d, stream_seed
+from experiments.rendering.sampling import Independent, Stratified, sobol_2d, stream_seed
 
 
 @pytest.mark.parametrize("seed", [0, 1, 12345, 0xFFFFFFFF])

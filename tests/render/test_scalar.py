@@ -9,10 +9,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from experiments.render.reference import Accumulator, Goal
-from experiments.render.scene import build
-from experiments.render.tracer import Tracer
-from experiments.scenes.catalogue import world_of
+from experiments.rendering.reference import Accumulator, Goal
+from experiments.rendering.scene import build
+from experiments.rendering.scenes.catalogue import world_of
+from experiments.rendering.tracer import Tracer
 from jflnr.camera import Camera
 
 SIZE = 16, 9
@@ -35,7 +35,7 @@ def fast(room: Any) -> tuple[Camera, dict[str, np.ndarray], np.ndarray]:
 
 
 def test_it_agrees(fast: Any, scalar: None) -> None:
-    from experiments.render.frame import Settings
+    from experiments.rendering.frame import Settings
 
     camera, guides, renders = fast
     tracer = Tracer.of(build(world_of("room")), camera, *SIZE)

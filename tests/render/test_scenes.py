@@ -8,14 +8,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from experiments.render import views
-from experiments.render.lambertian import load_xml
-from experiments.render.scene import build
-from experiments.render.source import load
-from experiments.render.tracer import Tracer
-from experiments.scenes import rooms
-from experiments.scenes.catalogue import CALM, FAMILIES, world_of
-from experiments.scenes.world import World
+from experiments.rendering import views
+from experiments.rendering.lambertian import load_xml
+from experiments.rendering.scene import build
+from experiments.rendering.scenes import rooms
+from experiments.rendering.scenes.catalogue import CALM, FAMILIES, world_of
+from experiments.rendering.scenes.world import World
+from experiments.rendering.source import load
+from experiments.rendering.tracer import Tracer
 
 
 def _vertices(world: World) -> np.ndarray:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.render.statistics import covered, measure, measure_file
+from experiments.rendering.statistics import covered, measure, measure_file
 from jflnr.exr import write_channels
 
 

@@ -9,9 +9,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from experiments.render.camera import looking
-from experiments.render.reference import Accumulator, Goal
-from experiments.render.tracer import Tracer, _primary_ray
+from experiments.rendering.camera import looking
+from experiments.rendering.reference import Accumulator, Goal
+from experiments.rendering.tracer import Tracer, _primary_ray
 
 Z = 4.5  # standard errors that a mean over a picture may be off
 
@@ -68,7 +68,7 @@ def _blocks(picture: Any) -> np.ndarray:
 
 def test_1_spp_renders_average_to_the_reference(tracer: Tracer, room: Any) -> None:
     """Many independent noisy layers, within the two standard errors of their mean and of it."""
-    from experiments.render.frame import Settings
+    from experiments.rendering.frame import Settings
 
     count = 128
     noisy = np.stack([_blocks(tracer.indirect(1, 100 + i).mean(-1)) for i in range(count)])

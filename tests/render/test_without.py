@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from experiments.render import backend
-from experiments.render.splits import check_split, split_of
+from experiments.rendering import backend
+from experiments.rendering.splits import check_split, split_of
 
 
 def test_mitsuba_is_there() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.render.camera import looking
+from experiments.rendering.camera import looking
 from jflnr.camera import centres
 from jflnr.temporal import Camera, camera_motion
 

@@ -41,7 +41,6 @@ function stepScene(by) {
 async function start() {
   buildHelp();
   buildTables();
-  buildChart();
   if (!CONTENT.scenes.length) return;
   $("scene").append(
     ...CONTENT.scenes.map((scene, i) => element("option", { value: i }, scene.name)),

@@ -1,5 +1,0 @@
-"""Path-traced frames of Lambertian scenes on Mitsuba 3, in the layers that jflnr reads.
-
-Follows section 4.1 of the FLNR paper. Mitsuba traces the rays, holds the scene and samples the
-lights; what is here decides which rays, and writes the frames.
-"""
