@@ -8,9 +8,10 @@ from jflnr.network import flnr as networks
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from tests.network.conftest import WIDTHS, scene_of
 
-flnr = jax.jit(
-    lambda target, guides, params, weight: networks.flnr(target, guides, params=params, weight=weight)
-)
+
+@jax.jit
+def flnr(target, guides, params, weight):
+    return networks.flnr(target, guides, params=params, weight=weight)
 
 
 @pytest.fixture(scope="module")

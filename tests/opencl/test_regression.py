@@ -19,8 +19,8 @@ from tests.oracle.flr_numpy import flr as numpy_flr
 def compare(context: Context, target: np.ndarray, guides: Any, **options: Any) -> float:
     """The error against the regression by plain loops in numpy, which compiles nothing.
 
-    tests/regression compares JAX with the same loops. Pixels that are not finite have weight 0 in them,
-    and are left out of the comparison.
+    tests/regression compares JAX with the same loops. Pixels that are not finite have weight 0 in
+    them, and are left out of the comparison.
     """
     found = flr(target, guides, PARAMETERS, context=context, **options)
     assert found.dtype == np.float32

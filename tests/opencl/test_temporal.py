@@ -22,6 +22,7 @@ from tests.temporal.bmfr_shot import shot
 
 GUIDES = ("normal", "depth")
 
+
 @pytest.fixture(scope="module")
 def frames() -> list[jflnr.Frame]:
     """Of a light that is switched on, with lost samples, and unknown motion."""
