@@ -80,6 +80,11 @@ class Denoiser:
         self.method, self.backend, self.guides = method_of(method, **options), backend, guides
         if backend not in self.method.backends:
             raise ValueError(f"method {self.method.name} runs on the jax backend only")
+        if guides is not None and (own := getattr(self.method, "features", None)):
+            raise ValueError(
+                f"method {self.method.name} has its own features, {' and '.join(own)}; guides are "
+                "for other methods"
+            )
         if tile is not None:
             checks.positive_integer("tile", tile)
             if not hasattr(self.method, "stages"):
