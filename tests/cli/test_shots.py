@@ -190,7 +190,10 @@ Refusal = Callable[[Path, Path], list[object]]
         (lambda shot, state: [shot, "--history", state, "--block", "4"], "--block"),
         (lambda shot, state: [shot, "--history", state, "--backend", "opencl"], "jax backend"),
         (lambda shot, state: [shot, "--method", "auto"], "by themselves"),
-        (lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal"], "own features"),
+        (
+            lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal", "--overwrite"],
+            "own features",
+        ),
         (lambda shot, state: [shot, shot.parent / "b", "--history", state], "one shot"),
     ],
 )
