@@ -80,6 +80,11 @@ class Denoiser:
         self.method, self.backend, self.guides = method_of(method, **options), backend, guides
         if backend not in self.method.backends:
             raise ValueError(f"method {self.method.name} runs on the jax backend only")
+        if guides is not None and (own := getattr(self.method, "features", None)):
+            raise ValueError(
+                f"method {self.method.name} has its own features, {' and '.join(own)}; guides are "
+                "for other methods"
+            )
         if tile is not None:
             checks.positive_integer("tile", tile)
             if not hasattr(self.method, "stages"):
@@ -99,7 +104,8 @@ class Denoiser:
             return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":
             return _given(_whole(method, inputs, names), frame, out)
-        return self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
+        light = self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
+        return light if out is not None else _given({"image": light}, frame, None)
 
     def next(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise the next frame of a shot, with what those before it left (docs/temporal.md).

@@ -45,7 +45,7 @@ def method_of(method: Any = DEFAULT, **options: Any) -> Any:
     Raises `ValueError` for a name that is none, `TypeError` for an option that it does not have.
     """
     if isinstance(method, str):
-        checks.choice("method", method, METHODS)
+        checks.choice("method", method, HOMES)
         home, kind, meant = HOMES[method]
         method = getattr(importlib.import_module(home), kind)(**meant)
     fields = [field.name for field in dataclasses.fields(method) if field.init]

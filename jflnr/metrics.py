@@ -17,6 +17,16 @@ GAMMA = 2.2
 # rMSE divides by the squared reference plus this share of its squared mean, so that neither black
 # pixels nor the scene's unit of light matter.
 RELATIVE_EPSILON = 1e-2
+# How reports name them.
+LABELS = {
+    "psnr": "PSNR dB",
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "rmse": "rMSE",
+    "smape": "SMAPE",
+    "mse": "MSE",
+    "mse_unbiased": "MSE unbiased",
+}
 
 
 def exposure(reference: np.ndarray) -> float:

@@ -44,16 +44,16 @@ def shown(frame: Frame, light: np.ndarray) -> float:
 
 def test_adaptive_parameters_lower_the_error_of_what_is_shown(frame: Frame) -> None:
     start = AdaptiveFLR(sigma=0.7)
-    found = fit([frame], "flr-adaptive", initial=start, steps=4)
+    found = fit([frame], start, steps=4)
     assert found.after < found.before - 0.1
-    for parameters, error in ((start, found.before), (found.parameters, found.after)):
-        light = np.asarray(jflnr.denoise(frame, "flr-adaptive", parameters=parameters))
+    for method, error in ((start, found.before), (found.method, found.after)):
+        light = np.asarray(jflnr.denoise(frame, method))
         assert shown(frame, light) == pytest.approx(error, abs=1e-3)
 
 
 def test_parameters_of_flr_lower_smape(frame: Frame) -> None:
-    found = fit([frame], initial=FLR(3, 1e-4, 1e-4), steps=4)
-    assert found.after < 0.9 * found.before and float(found.parameters.sigma) > 4
+    found = fit([frame], FLR(3, 1e-4, 1e-4), steps=4)
+    assert found.after < 0.9 * found.before and found.method.sigma > 4
 
 
 def test_what_cannot_be_fitted_is_refused(frame: Frame) -> None:

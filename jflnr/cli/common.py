@@ -13,15 +13,6 @@ from typing import Any, TextIO
 INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
 
 COLOURS = {"red": 31, "yellow": 33}
-LABELS = {
-    "psnr": "PSNR dB",
-    "ssim": "SSIM",
-    "flip": "FLIP",
-    "rmse": "rMSE",
-    "smape": "SMAPE",
-    "mse": "MSE",
-    "mse_unbiased": "MSE unbiased",
-}
 
 
 def sentence(error: BaseException) -> str:
@@ -100,6 +91,8 @@ def table(rows: Sequence[Sequence[str]], left: int = 1) -> str:
 
 def metrics_table(measured: Mapping[str, Mapping[str, float | None]]) -> str:
     """One row of metrics per image, `-` for one that could not be taken."""
+    from jflnr.metrics import LABELS
+
     names = list(next(iter(measured.values())))
     rows = [["", *(LABELS[name] for name in names)]]
     for image, values in measured.items():

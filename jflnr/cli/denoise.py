@@ -26,7 +26,7 @@ from jflnr.cli.jobs import Job, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import remarks, summary, throughput
-from jflnr.methods import BACKENDS, DEFAULT, METHODS
+from jflnr.methods import BACKENDS, DEFAULT, HOMES
 
 EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
@@ -46,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
     add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
-    listed = ", ".join(METHODS)
-    add("--method", default=DEFAULT, choices=METHODS, metavar="M", help=f"{listed} ({DEFAULT})")
+    listed = ", ".join(HOMES)
+    add("--method", default=DEFAULT, choices=HOMES, metavar="M", help=f"{listed} ({DEFAULT})")
     add(
         "--explain",
         action="store_true",

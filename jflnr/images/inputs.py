@@ -23,11 +23,6 @@ def prepare(
     Raises `ValueError` or `TypeError` naming the argument. Warns if the frame has no occlusion.
     """
     own = hasattr(method, "features")
-    if own and guides is not None:
-        raise ValueError(
-            f"method {method.name} has its own features, {' and '.join(method.features)}; guides "
-            "are for other methods"
-        )
     names = guide_layers.choose(frame, ("normal", "depth") if own else guides)
     inputs = frame_inputs(frame, names)
     _check_sizes(inputs)

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from jflnr.cli.common import LABELS
 from jflnr.files import write_atomically
 from jflnr.frame import HALF_MAX, Frame
-from jflnr.metrics import RELATIVE_EPSILON, display, exposure, flip_map
+from jflnr.metrics import LABELS, RELATIVE_EPSILON, display, exposure, flip_map
 from jflnr.report.crops import find_crops
 from jflnr.report.scenes import REFERENCE, Scene
 

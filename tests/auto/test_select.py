@@ -82,7 +82,7 @@ def test_small_frames(rng):
 def test_refusals(frame):
     with pytest.raises(ValueError, match="jax backend"):
         jflnr.denoise(frame, "auto", backend="opencl")
-    with pytest.raises(ValueError, match="in one piece"):
+    with pytest.raises(ValueError, match="does not work in tiles"):
         jflnr.denoise(frame, "auto", tile=256)
     with pytest.raises(ValueError, match="budget_ms is -1"):
         jflnr.select(frame, budget_ms=-1)

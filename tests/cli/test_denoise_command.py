@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import termios
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,9 @@ from jflnr.cli.jobs import plan
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 from jflnr.metrics import exposure
 from jflnr.network.weights import FOLDER, shipped
+from jflnr.parameters import save_parameters
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.flr import FLR
 
 
 @pytest.fixture
@@ -32,11 +36,14 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
     """A denoiser that halves the light; the list receives what it was called with."""
     calls: list[dict] = []
 
-    def denoise(frame: Frame, **settings: object) -> np.ndarray:
-        calls.append(settings)
-        return 0.5 * np.asarray(frame.indirect)
+    def denoiser(**settings: object) -> Callable[[Frame], np.ndarray]:
+        def denoise(frame: Frame) -> np.ndarray:
+            calls.append(settings)
+            return 0.5 * np.asarray(frame.indirect)
 
-    monkeypatch.setattr(denoising, "denoise", denoise)
+        return denoise
+
+    monkeypatch.setattr(denoising, "Denoiser", denoiser)
     return calls
 
 
@@ -98,13 +105,12 @@ def test_options_reach_the_denoiser(tmp_path: Path, frame_file: Path, stand_in: 
     assert run(frame_file, *out, "--params", params, "--eps", "0.5", "--guides", "normal,ao") == 0
     assert run(frame_file, *out, "--block", "2", "--guides", "") == 0
     default, from_file, mixed, bare = stand_in[::2]  # once to compile, once to take the time
-    assert (default["method"], default["backend"], default["guides"]) == ("flr", "jax", None)
-    assert (from_file["block"], from_file["guides"]) == (4, ["depth"])
-    assert float(from_file["parameters"].sigma) == pytest.approx(5)
-    assert (mixed["block"], mixed["guides"]) == (4, ("normal", "ao"))
-    assert float(mixed["parameters"].eps) == pytest.approx(0.5)
-    assert float(mixed["parameters"].eps_prime) == pytest.approx(1e-3)
-    assert (bare["block"], bare["guides"]) == (2, ())
+    assert default == {"method": FLR(), "backend": "jax", "guides": None}
+    assert from_file["method"] == FLR(5, 1e-2, 1e-3, block=4)
+    assert from_file["guides"] == ["depth"]
+    assert mixed["method"] == FLR(5, 0.5, 1e-3, block=4)
+    assert mixed["guides"] == ("normal", "ao")
+    assert (bare["method"], bare["guides"]) == (FLR(block=2), ())
 
 
 def test_weights_of_ones_own_reach_the_denoiser(
@@ -112,7 +118,7 @@ def test_weights_of_ones_own_reach_the_denoiser(
 ) -> None:
     weights = FOLDER / "flnr.npz"
     assert run(frame_file, "-o", tmp_path / "o.exr", "--method", "flnr", "--params", weights) == 0
-    assert stand_in[0]["parameters"].keys() == shipped("flnr").keys()
+    assert stand_in[0]["method"].params.keys() == shipped("flnr").keys()
 
 
 def test_direct_light_is_denoised_beside_the_indirect(
@@ -271,14 +277,12 @@ ERRORS = [
     (("frame.exr", "-o", "frame.exr"), "OUT would replace an input"),
     (("frame.exr", "frames/a.exr", "frames/../frames/a.exr", "-o", "o"), "would both be written"),
     (("frame.exr", "-o", "notes.txt/out.exr"), "notes.txt/out.exr cannot be written"),
-    (("frame.exr", "-o", "out.exr", "--method", "magic"), "--method must be one of flr"),
-    (("frame.exr", "-o", "out.exr", "--backend", "abacus"), "--backend must be one of jax"),
     (("frame.exr", "-o", "out.exr", "--spp", "4"), "there is indirect light for spp 1"),
     (("frame.exr", "-o", "out.exr", "--spp", "0"), "spp must be at least 1"),
     (("frame.exr", "-o", "out.exr", "--sigma", "-1"), "sigma"),
     (("frame.exr", "-o", "out.exr", "--eps", "nan"), "eps"),
     (("frame.exr", "-o", "out.exr", "--guides", "colour"), "'colour'"),
-    (("frame.exr", "-o", "out.exr", "--block", "0"), "frame.exr: block must be at least 1"),
+    (("frame.exr", "-o", "out.exr", "--block", "0"), "block must be at least 1"),
     (("frame.exr", "-o", "out.exr", "--params", "gone.json"), "there is no such file"),
     (("frame.exr", "-o", "out.exr", "--params", "notes.txt"), "notes.txt"),
     (("frame.exr", "-o", "out.exr", "--params", "odd.json"), "must be a list of names"),
@@ -328,10 +332,10 @@ def test_interrupt_between_write_and_rename_leaves_nothing(
 LOOP = """
 import sys, time, numpy as np
 from jflnr import denoising
-def slow(frame, **_):
+def slow(frame):
     time.sleep(0.05)
     return np.asarray(frame.indirect)
-denoising.denoise = slow
+denoising.Denoiser = lambda **_: slow
 from jflnr.cli import main
 sys.exit(main(sys.argv[1:]))
 """
@@ -387,13 +391,25 @@ def test_the_real_thing(tmp_path: Path, frame: Frame, frame_file: Path) -> None:
     assert after["psnr"] > before["psnr"] + 10
 
 
-def test_error_map(tmp_path: Path, frame: Frame, frame_file: Path, monkeypatch, capsys) -> None:
-    told = np.full((24, 40, 1), 0.25, np.float32)
-    monkeypatch.setattr(
-        "jflnr.uncertainty.denoise_with_error", lambda f, guides: (f.indirect, told)
-    )
-    out = tmp_path / "out.exr"
-    assert run(frame_file, "-o", out, "--error-map", "--method", "flr-adaptive") == 0
+def test_error_map(
+    tmp_path: Path,
+    frame_file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """It is told of what the other options say, not of the defaults."""
+    params, told = tmp_path / "p.json", np.full((24, 40, 1), 0.25, np.float32)
+    save_parameters(params, AdaptiveFLR(sigma=1.5))
+    given: list[AdaptiveFLR] = []
+
+    def denoiser(method: AdaptiveFLR, **_: object) -> Callable[[Frame], tuple]:
+        given.append(method)
+        return lambda frame: (frame.indirect, told)
+
+    monkeypatch.setattr(denoising, "Denoiser", denoiser)
+    out, options = tmp_path / "out.exr", ("--error-map", "--params", params, "--block", "4")
+    assert run(frame_file, "-o", out, "--method", "flr-adaptive", *options) == 0
     assert np.all(exr.read_channels(out)["error.Y"] == 0.25)
+    assert given == [AdaptiveFLR(sigma=1.5, block=4, with_error=True)]
     assert run(frame_file, "-o", tmp_path / "other.exr", "--error-map") == 2
     assert "flr-adaptive" in capsys.readouterr().err

@@ -1,6 +1,6 @@
 """`jflnr denoise --method auto --explain`: what it prints, and the map it writes.
 
-Denoising and planning are stood in for; what they do is tested in tests/selection.
+Denoising and planning are stood in for; what they do is tested in tests/auto.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Plan:
     cost = {"blocks-8": 1.0, "blocks-4": 1.5}
     plan = Plan("blocks-8", ("normal", "ao"), decibels, cost, 12.0, order, 8, 3)
     monkeypatch.setattr(method, "plan_of", lambda *arguments: plan)
-    monkeypatch.setattr(denoising, "denoise", lambda frame, **settings: 0.5 * frame.indirect)
+    monkeypatch.setattr(denoising, "Denoiser", lambda **_: lambda frame: 0.5 * frame.indirect)
     return plan
 
 

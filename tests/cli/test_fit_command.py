@@ -23,17 +23,16 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
 
     def fit(
         frames: Sequence[Frame],
-        method: str,
+        method: FLR | AdaptiveFLR,
         *,
         progress: Callable[[int, float], None],
         **settings: object,
     ) -> fitting.Fit:
         calls.append({"frames": len(frames), "method": method, **settings})
         progress(1, 0.25)
-        numbers = FLR(20, 1e-3, 1e-4)
-        if method == "flr-adaptive":
-            return fitting.Fit(AdaptiveFLR(sigma=1.5), -20, -21, 1)
-        return fitting.Fit(numbers, 0.5, 0.25, 1)
+        if isinstance(method, AdaptiveFLR):
+            return fitting.Fit(dataclasses.replace(method, sigma=1.5), -20, -21, 1)
+        return fitting.Fit(FLR(20, 1e-3, 1e-4, block=method.block), 0.5, 0.25, 1)
 
     monkeypatch.setattr(fitting, "fit", fit)
     return calls
@@ -50,11 +49,9 @@ def test_result_is_printed_and_read_by_denoise(
     assert main([*argv, "--guides", "normal", "--block", "4"]) == 0
     text = capsys.readouterr().out
     assert "step 1: SMAPE 0.25" in text and "SMAPE 0.50000 before, 0.25000 after, steps: 1" in text
-    assert stand_in == [
-        {"frames": 2, "method": "flr", "guides": ("normal",), "block": 4, "steps": 3}
-    ]
-    parameters, about = load_parameters(out)
-    assert float(parameters.sigma) == pytest.approx(20)
+    assert stand_in == [{"frames": 2, "method": FLR(block=4), "guides": ("normal",), "steps": 3}]
+    method, about = load_parameters(out)
+    assert method == FLR(20, 1e-3, 1e-4)
     assert (about["guides"], about["block"], about["spp"]) == (["normal"], 4, [1])
 
 
@@ -69,12 +66,11 @@ def test_parameters_are_for_the_method_they_were_fitted_for(
     assert main(argv) == 0
     assert "sigma 1.5, eps 0.0001" in capsys.readouterr().out
     found, about = load_parameters(params)
-    assert isinstance(found, AdaptiveFLR) and "block" not in about
-    np.testing.assert_allclose(found, AdaptiveFLR(sigma=1.5), rtol=1e-6)
+    assert found == AdaptiveFLR(sigma=1.5) and about["block"] == 8
     denoise = ["denoise", str(frame_file), "-o", str(out), "--params", str(params)]
     assert main([*denoise, "--method", "flr-adaptive", "--quiet"]) == 0
     light = exr.read_channels(out / frame_file.name)["indirect.G"]
-    wanted = jflnr.denoise(read_frame(frame_file), "flr-adaptive", parameters=found)
+    wanted = jflnr.denoise(read_frame(frame_file), found)
     np.testing.assert_allclose(light, wanted[..., 1], rtol=2e-3, atol=1e-4)
     assert main(denoise) == 2
     assert "holds parameters of method flr-adaptive" in capsys.readouterr().err

@@ -34,6 +34,8 @@ def test_help_shows_examples(argv: list[str], capsys: pytest.CaptureFixture[str]
         (["denoise", "a.exr"], "the following arguments are required: -o/--output"),
         (["denoise", "a.exr", "-o", "b.exr", "--spp", "x"], "invalid int value: 'x'"),
         (["denoise", "a.exr", "-o", "b.exr", "--sig", "3"], "unrecognized arguments: --sig"),
+        (["denoise", "a.exr", "-o", "b.exr", "--method", "magic"], "invalid choice: 'magic'"),
+        (["denoise", "a.exr", "-o", "b.exr", "--backend", "abacus"], "invalid choice: 'abacus'"),
         (["info"], "the following arguments are required: FILE"),
     ],
 )

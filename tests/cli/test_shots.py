@@ -16,8 +16,10 @@ from jflnr.bmfr import pipeline as bmfr
 from jflnr.cli import main
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.shots import shots_of
-from jflnr.frame import Frame, read_frame, write_frame
+from jflnr.frame import Frame, read_frame, read_header, write_frame
 from jflnr.opencl import NoDevice, all_devices
+from jflnr.parameters import save_parameters
+from jflnr.regression.flr import FLR
 
 NAMES = [f"f_{i}.exr" for i in (1, 2, 3, 10)]  # in an order that is not that of the alphabet
 
@@ -185,10 +187,13 @@ Refusal = Callable[[Path, Path], list[object]]
         (lambda shot, state: [shot, "--history", state, "--overwrite"], "delete it"),
         (lambda shot, state: [shot, "--history", state, "--method", "flr-adaptive"], "--method"),
         (lambda shot, state: [shot, "--history", shot / NAMES[0]], "not a history"),
-        (lambda shot, state: [shot, "--block", "4"], "--block"),
+        (lambda shot, state: [shot, "--history", state, "--block", "4"], "--block"),
         (lambda shot, state: [shot, "--history", state, "--backend", "opencl"], "jax backend"),
-        (lambda shot, state: [shot, "--method", "auto"], "flr-adaptive"),
-        (lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal"], "--guides"),
+        (lambda shot, state: [shot, "--method", "auto"], "by themselves"),
+        (
+            lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal", "--overwrite"],
+            "own features",
+        ),
         (lambda shot, state: [shot, shot.parent / "b", "--history", state], "one shot"),
     ],
 )
@@ -244,6 +249,19 @@ def test_bmfr_is_its_own_step_function(shot: Path, tmp_path: Path) -> None:
     for name, frame in zip(NAMES, frames, strict=True):
         state, image = bmfr.step(state, frame)
         np.testing.assert_allclose(light(tmp_path / name), image, rtol=1e-5, atol=1e-6)
+
+
+def test_a_fitted_block_is_used_over_time(shot: Path, tmp_path: Path) -> None:
+    params, out = tmp_path / "p.json", tmp_path / "out"
+    save_parameters(params, FLR(6, 1e-3, 1e-3), block=4)
+    assert run(shot, "-o", out, "--params", params, "--guides", "depth") == 0
+    state = temporal.start(read_frame(shot / NAMES[0]))
+    method = FLR(6, 1e-3, 1e-3, block=4)
+    for name in NAMES:
+        frame = read_frame(shot / name)
+        state, image = temporal.step(state, frame, method, guides=("depth",))
+        np.testing.assert_allclose(light(out / name), image, rtol=1e-5, atol=1e-6)
+        assert read_header(out / name)["denoiser"]["block"] == 4
 
 
 def test_a_history_is_what_was_written(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 import jflnr
 from jflnr.frame import Frame
-from jflnr.regression.flr import DEFAULT, flr
+from jflnr.regression.flr import DEFAULT, FLR, flr
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
 long = functools.partial(
@@ -103,12 +103,12 @@ def _compiled():
 
 
 def stays_a_number(y, x, weight, logs):
-    """Whatever the values and parameters, also NaN and infinities: no NaN where light is finite.
+    """Whatever the values and numbers, also NaN and infinities: no NaN where light is finite.
 
     A sum may still leave float32 where radiance and guides are both huge, so infinities are allowed
     only there.
     """
-    out = np.asarray(_compiled()(y, x, Parameters(*map(np.float32, logs)), weight))
+    out = np.asarray(_compiled()(y, x, FLR(*np.exp(np.float32(logs))), weight))
     large = np.abs(np.nan_to_num(y, posinf=0, neginf=0)).max()
     if large < 1e15:
         assert np.isfinite(out).all()

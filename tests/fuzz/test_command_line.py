@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from jflnr.cli import main
-from jflnr.parameters import load_parameters
+from jflnr.parameters import load_parameters, numbers_of
 from jflnr.regression.adaptive import AdaptiveFLR
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
@@ -97,7 +97,7 @@ FILES = st.one_of(
         },
     ).map(lambda d: json.dumps(d).encode()),
     st.fixed_dictionaries(
-        dict.fromkeys(AdaptiveFLR._fields, NUMBERS),
+        dict.fromkeys(numbers_of(AdaptiveFLR()), NUMBERS),
         optional={"method": st.sampled_from(["flr", "flr-adaptive", "auto", None, 1, [], {}])},
     ).map(lambda d: json.dumps({"format": "jflnr-parameters", "version": 1, **d}).encode()),
 )
@@ -107,11 +107,11 @@ def loads_or_refuses(folder, content):
     path = folder / "p.json"
     path.write_bytes(content)
     try:
-        parameters, _ = load_parameters(path)
+        method, _ = load_parameters(path)
     except ValueError as error:
         assert 10 < len(str(error)) < 500
     else:
-        assert all(math.isfinite(number) for number in parameters)
+        assert all(math.isfinite(n) and n > 0 for n in numbers_of(method).values())
 
 
 @short(max_examples=200, suppress_health_check=reuse)

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from jflnr import flnr, history
+from jflnr import history
 from jflnr.network import weights
 from tests.fuzz.test_arrays import long, short
 
+NETWORKS = sorted(path.stem for path in weights.FOLDER.glob("*.npz"))
 reuse = [HealthCheck.function_scoped_fixture, *HealthCheck]
 DAMAGE = st.one_of(
     st.tuples(st.just("cut"), st.floats(0, 1), st.just(b"")),
@@ -51,7 +52,7 @@ def weights_are_whole_or_refused(folder, method, damage):
         assert all(np.isfinite(array).all() for array in found.values())
 
 
-@pytest.mark.parametrize("method", flnr.METHODS)
+@pytest.mark.parametrize("method", NETWORKS)
 @short(max_examples=40, suppress_health_check=reuse)
 @given(damage=DAMAGE)
 def test_weights(tmp_path, method, damage):
@@ -59,7 +60,7 @@ def test_weights(tmp_path, method, damage):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", flnr.METHODS)
+@pytest.mark.parametrize("method", NETWORKS)
 @long(max_examples=3000, suppress_health_check=reuse)
 @given(damage=DAMAGE)
 def test_weights_long(tmp_path, method, damage):

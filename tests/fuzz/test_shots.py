@@ -33,7 +33,7 @@ OPTIONS = st.fixed_dictionaries(
     optional={
         "method": st.sampled_from(["flr", "flnr-tiny", "bmfr", "auto", "", None, 3]),
         "guides": st.sampled_from([(), ("normal",), ("depth", "depth"), ("colour",)]),
-        "parameters": st.sampled_from([{}, 1.0, bmfr.PAPER, (0.0, 0.0, 0.0)]),
+        "sigma": st.sampled_from([{}, 1.0, bmfr.PAPER, (0.0, 0.0, 0.0)]),
     },
 )
 LIMITS = st.sampled_from([None, 0, -1.0, float("nan"), float("inf")])

@@ -7,11 +7,15 @@ import pytest
 from jax import random
 
 from jflnr.auto import nested
+from jflnr.bmfr import fit as bmfr_fit
+from jflnr.bmfr import pipeline as bmfr
+from jflnr.bmfr import taa as bmfr_taa
 from jflnr.frame import Frame, composite
 from jflnr.images.noisy_guides import smooth_guide
-from jflnr.network import paper, regression
+from jflnr.network import flnr as networks
+from jflnr.network import paper
 from jflnr.network.loss import relative
-from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.energy import rescale, restore
 from jflnr.regression.flr import FLR
@@ -24,9 +28,6 @@ from jflnr.temporal import (
     Camera,
     Surface,
     accumulate,
-    bmfr,
-    bmfr_fit,
-    bmfr_taa,
     camera_motion,
     find_taps,
     gather,
@@ -36,7 +37,9 @@ from tests.gradients.directions import agree
 
 SIZE = 6, 7
 SHIFT = np.array([0.1, -0.2])
-PARAMETERS = FLR(sigma=5.0, eps=1e-2, eps_prime=1e-2)
+# Differences are taken of the logarithms, which are of order 1.
+LOGARITHMS = np.log([5.0, 1e-2, 1e-2])
+LOG_ADAPTIVE = jax.tree.map(jnp.log, AdaptiveFLR())
 RNG = np.random.default_rng(2)
 
 
@@ -80,8 +83,8 @@ STEPS = {
     ),
     "solve, 16 guides": (cholesky_solve, (well_posed(16), normal(16, 2, 1, 1))),
     "normalised solve, 16 guides": (
-        lambda m, p: solve(m, jnp.full(16, 0.1), p, 1),
-        (moments_of(16, 1, 1, 1), PARAMETERS),
+        lambda m, p: solve(m, jnp.full(16, 0.1), FLR(*jnp.exp(p)), 1),
+        (moments_of(16, 1, 1, 1), LOGARITHMS),
     ),
     "orders of models": (
         lambda m, e, n: nested.fit_orders(m, jnp.asarray(SHIFT), (e, e), n, (1, 1), 1),
@@ -96,12 +99,12 @@ STEPS = {
         (positive(3, 3, 4, 6), moments_of(2, 1, 2, 3), positive(*SIZE, 3), positive(*SIZE)),
     ),
     "FLNR of the paper": (
-        lambda y, x, w, p: paper.flnr_of_paper(y, x, w, p, block=2, support=12),
+        lambda y, x, w, p: paper.flnr_of_paper(y, x, w, FLR(*jnp.exp(p), block=2, support=12)),
         (
             positive(*SIZE, 2),
             normal(*SIZE, 2),
             paper.init(random.key(0), 4, 2, (3, 4)),
-            PARAMETERS,
+            LOGARITHMS,
         ),
     ),
     "composite": (
@@ -177,16 +180,20 @@ def next_of_shot(step, start, *options):
     return both
 
 
+def exp(method):
+    return jax.tree.map(jnp.exp, method)
+
+
 LIGHT = positive(*SIZE, 3)
 FRAMES = LIGHT, 1.1 * LIGHT + 0.1 * positive(*SIZE, 3)
 WHOLE = {
     "adaptive FLR and its error": (
-        lambda y, x, p: flr_adaptive_with_error(y, x, p),
-        (positive(40, 48, 3), normal(40, 48, 2), AdaptiveFLR()),
+        lambda y, x, p: flr_adaptive(y, x, exp(p), with_error=True),
+        (positive(40, 48, 3), normal(40, 48, 2), LOG_ADAPTIVE),
     ),
     "FLNR": (
-        lambda y, x, w: regression.flnr(y, x, w),
-        (positive(40, 48, 3), normal(40, 48, 5), regression.init(random.key(0), (4, 4))),
+        lambda y, x, w: networks.flnr(y, x, params=w),
+        (positive(40, 48, 3), normal(40, 48, 5), networks.init(random.key(0), (4, 4))),
     ),
     "shots": (next_of_shot(sequence.step, sequence.start, "flr"), FRAMES),
     "BMFR": (next_of_shot(bmfr.step, bmfr.start), FRAMES),

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jflnr.network import features, loss, regression, unet
+from jflnr.network import features, loss, unet
 from jflnr.network.examples import Example
+from jflnr.network.flnr import DEFAULT, FLNR, init
 from jflnr.regression.moments import collect
+from jflnr.stages import run
 
 GUIDES = 5
 
@@ -29,31 +31,28 @@ def example(rng):
     shift = 0.3 * noise(GUIDES)
     target, guides = rng.exponential(1.3, (24, 32, 3)), 0.3 * noise(24, 32, GUIDES)
     with jax.enable_x64(True):
-        moments = collect(jnp.asarray(target), jnp.asarray(guides), shift, regression.BLOCK)
-    known = regression.Prepared(
-        x=noise(6 // 2, 8 // 2, features.COUNT),
-        steered=regression.Steered(
-            moments=np.asarray(moments),
-            noise=rng.uniform(0.5, 1, (1, 6, 8)),
-            factor=rng.uniform(0.9, 1.1, (6, 8)),
-            mean=np.array(1.3),
-            dark=np.array(0.04),
-        ),
-        unit=np.array(2.0),
-    )
-    return Example(
-        prepared=known,
-        shift=shift,
-        guides=guides,
-        albedo=rng.uniform(0.2, 0.8, (24, 32, 3)),
-        target=rng.uniform(0.2, 0.6, (24, 32, 3)),
-        exposure=np.array(0.3),
-    )
+        moments = collect(jnp.asarray(target), jnp.asarray(guides), shift, DEFAULT.finest)
+    parts = {
+        "read": noise(features.COUNT - 2, 3, 4),
+        "moments": np.concatenate([moments, rng.uniform(0.5, 1, (1, 6, 8))]),
+        "output": rng.uniform(0.5, 1.5, (3, 4)),
+        "guides": guides,
+    }
+    known = {
+        "shift": shift,
+        "unit": np.array(2.0),
+        "mean": np.array(1.3),
+        "means": np.array([1.2, 0.1]),
+        "wanted": np.array(15.0),
+        "rate": np.array(0.05),
+    }
+    albedo, target = rng.uniform(0.2, 0.8, (24, 32, 3)), rng.uniform(0.2, 0.6, (24, 32, 3))
+    return Example(parts, known, albedo, target, exposure=np.array(0.3))
 
 
 @pytest.fixture
 def params(rng):
-    start = regression.init(jax.random.key(0), (4, 4, 4))
+    start = init(jax.random.key(0), (4, 4, 4))
     return {name: value + 0.1 * rng.standard_normal(value.shape) for name, value in start.items()}
 
 
@@ -66,13 +65,13 @@ def test_network(rng):
 
 
 def test_models_by_the_weights(params, example):
-    known, shift = example.prepared, example.shift
-
     def models(p, moments):
-        says = regression.heard(p, known.x, known.size)
-        return regression.finish(says, known.steered._replace(moments=moments), shift)
+        method = FLNR(params=p)
+        steer, fit, _ = method.with_network()
+        parts = example.parts | {"moments": moments}
+        return run((steer, fit), method, parts, example.known)[0]["models"]
 
-    check(models, params, known.steered.moments)
+    check(models, params, example.parts["moments"])
 
 
 def test_what_training_minimises(params, example):

@@ -55,14 +55,15 @@ def derivatives_agree(problem):
     """Forward mode against Richardson's extrapolation, reverse mode against forward mode."""
     rng = np.random.default_rng(problem["seed"])
     size, block = problem["size"], problem["block"]
-    parameters = FLR(problem["sigma"], 1e-3, 1e-2)
+    logarithms = np.log([problem["sigma"], 1e-3, 1e-2])
     with jax.enable_x64(True):
 
         def normal(count):
             return jnp.asarray(rng.standard_normal((*size, count)))
 
         def whole(arrays):
-            return flr(*arrays, block=block, support=8)
+            target, guides, logarithms = arrays
+            return flr(target, guides, FLR(*jnp.exp(logarithms), block=block, support=8))
 
         @jax.jit
         def both(point, direction, back):
@@ -72,9 +73,8 @@ def derivatives_agree(problem):
         evaluate = jax.jit(whole)
 
         counts = problem["channels"], problem["guides"]
-        point = (*(normal(n) for n in counts), jax.tree.map(jnp.float64, parameters))
-        numbers = Parameters(*map(jnp.float64, rng.standard_normal(3)))
-        direction = (*(normal(n) for n in counts), numbers)
+        point = (*(normal(n) for n in counts), jnp.asarray(logarithms))
+        direction = (*(normal(n) for n in counts), jnp.asarray(rng.standard_normal(3)))
 
         def central(h):
             ends = [jax.tree.map(lambda a, d, s=s: a + s * d, point, direction) for s in (h, -h)]

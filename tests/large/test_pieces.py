@@ -1,6 +1,7 @@
 """A frame in pieces: the result of the whole."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +11,10 @@ import pytest
 import jflnr
 from jflnr import denoising
 from jflnr.frame import Frame
-from jflnr.large import memory, strips
+from jflnr.large import memory
 from jflnr.large.pieces import pieces
 from jflnr.large.planes import Planes
+from jflnr.methods import method_of
 
 # One unit in the last place of the shift or the scale, which whole and pieces may round apart, is
 # magnified by the regression; a seam would be a thousand times larger.
@@ -74,9 +76,9 @@ def test_options_of_flr_hold_in_strips(rng):
     coarse = room(rng, 45, 33).indirect
     position = np.concatenate([fine.depth, fine.ao, fine.depth], axis=-1) + 100
     frame = dataclasses.replace(fine, indirect=coarse, position=position)
-    options = {"guides": ("normal", "position"), "parameters": jflnr.FLR(9, 1e-4, 1e-3)}
-    whole = np.asarray(jflnr.denoise(frame, block=4, **options))
-    assert relative(jflnr.denoise(frame, block=4, tile=30, **options), whole) < RELATIVE
+    method, guides = jflnr.FLR(9, 1e-4, 1e-3, block=4), ("normal", "position")
+    whole = np.asarray(jflnr.denoise(frame, method, guides=guides))
+    assert relative(jflnr.denoise(frame, method, guides=guides, tile=30), whole) < RELATIVE
 
 
 @pytest.mark.parametrize(
@@ -116,14 +118,16 @@ def test_a_wrong_tile_is_named(frame):
 
 
 @pytest.mark.parametrize(
-    "method, backend, advice",
-    [("bmfr", "jax", "raise --memory$"), ("flnr", "opencl", "or take --backend jax$")],
+    "method, backend, message",
+    [
+        ("bmfr", "jax", "method bmfr does not work in tiles"),
+        ("auto", "jax", "method auto does not work in tiles"),
+        ("flnr", "opencl", "flnr on opencl needs the whole frame in memory: .* jax backend$"),
+    ],
 )
-def test_what_cannot_be_done_in_pieces_is_named(frame, method, backend, advice):
-    rows = strips.rows_of(frame)
-    message = f"method {method} on {backend} needs the whole frame in memory: .*{advice}"
+def test_what_cannot_be_done_in_pieces_is_named(frame, method, backend, message):
     with pytest.raises(ValueError, match=message):
-        strips.denoise(rows, strips.Options(method, None, (), 8, backend), 32)
+        jflnr.denoise(frame, method, backend=backend, tile=32)
 
 
 @pytest.mark.parametrize("text, size", [("4G", 4 << 30), ("1.5GiB", 3 << 29), ("800m", 800 << 20)])
@@ -140,21 +144,27 @@ def test_what_is_no_size_is_named(text):
 @pytest.mark.parametrize(("method", "gigabytes"), [("flr", 4), ("flr-adaptive", 4), ("flnr", 12)])
 def test_larger_frames_come_in_smaller_pieces(method, gigabytes):
     gigabyte = 1 << 30
-    assert memory.tile_for(1080, 1920, 4 * gigabyte, method=method) is None
-    large = memory.tile_for(8192, 16384, gigabytes * gigabyte, method=method)
-    larger = memory.tile_for(16384, 32768, gigabytes * gigabyte, method=method)
+    tile_for = functools.partial(memory.tile_for, at_once=1, method=method_of(method))
+    assert tile_for(1080, 1920, 4 * gigabyte) is None
+    large = tile_for(8192, 16384, gigabytes * gigabyte)
+    larger = tile_for(16384, 32768, gigabytes * gigabyte)
     assert large > larger > 0
     with pytest.raises(ValueError, match="too little for 16384 x 8192 pixels"):
-        memory.tile_for(8192, 16384, gigabyte // 2, method=method)
+        tile_for(8192, 16384, gigabyte // 2)
+
+
+def test_more_frames_at_once_leave_less_for_each():
+    tile_for = functools.partial(memory.tile_for, 1080, 1920, 2 << 30, method=method_of("flr"))
+    assert tile_for(at_once=1) is None and tile_for(at_once=3) > 0
 
 
 def test_sizes_that_differ_by_less_than_a_block_share_a_program(rng):
     whole = room(rng, 48, 64)
     sizes = [(47, 60), (41, 57), (48, 63)]
     frames = [jax.tree.map(lambda a, h=h, w=w: a[:h, :w], whole) for h, w in sizes]
-    before = denoising._denoise._cache_size()
+    before = denoising._whole._cache_size()
     ours = [np.asarray(jflnr.denoise(frame)) for frame in frames]
-    assert denoising._denoise._cache_size() == before + 1
+    assert denoising._whole._cache_size() == before + 1
     # As an array of JAX it is not padded.
     plain = np.asarray(jflnr.denoise(jax.tree.map(jnp.asarray, frames[1])))
     assert [image.shape[:2] for image in ours] == sizes

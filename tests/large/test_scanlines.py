@@ -10,9 +10,11 @@ from jflnr import exr
 from jflnr.cli import main, parser
 from jflnr.cli.jobs import Job
 from jflnr.cli.settings import settings_of
+from jflnr.methods import method_of
 
 pytest.importorskip("OpenImageIO")
 from jflnr.cli.strips import denoise_in_strips
+from jflnr.large.memory import tile_for
 from jflnr.large.scanlines import Scanlines, writing
 
 
@@ -55,7 +57,8 @@ def test_a_file_in_strips_is_the_file_denoised(frame_file, tmp_path, options):
     whole, ours = tmp_path / "whole.exr", tmp_path / "strips.exr"
     assert main(["denoise", str(frame_file), "-o", str(whole), *options]) == 0
     arguments = parser().parse_args(["denoise", str(frame_file), "-o", str(ours), *options])
-    record = denoise_in_strips(Job(frame_file, ours), settings_of(arguments), arguments, tile=16)
+    denoiser = jflnr.Denoiser(**settings_of(arguments))
+    record = denoise_in_strips(Job(frame_file, ours), denoiser, arguments, tile=16)
     assert (record["status"], record["width"], record["height"]) == ("written", 40, 24)
     wanted, found = exr.read_channels(whole), exr.read_channels(ours)
     assert found.keys() == wanted.keys()
@@ -68,11 +71,17 @@ def test_a_file_in_strips_is_the_file_denoised(frame_file, tmp_path, options):
 
 @pytest.mark.parametrize(
     "options",
-    ["--png", "--reference", "--method auto", "--channels all", "--method flnr --error-map"],
+    ["--png", "--reference", "--channels all"],
 )
 def test_what_needs_the_whole_frame_is_named(frame_file, tmp_path, options):
     command = ["denoise", str(frame_file), "-o", str(tmp_path / "o.exr"), *options.split()]
     arguments = parser().parse_args(command)
-    wanted = options.removeprefix("--method flnr ")
-    with pytest.raises(ValueError, match=f"{wanted} needs the whole frame in memory: raise"):
-        denoise_in_strips(Job(frame_file, tmp_path / "o.exr"), {}, arguments, 16)
+    denoiser, job = jflnr.Denoiser(**settings_of(arguments)), Job(frame_file, tmp_path / "o.exr")
+    with pytest.raises(ValueError, match=f"{options} needs the whole frame in memory: raise"):
+        denoise_in_strips(job, denoiser, arguments, 16)
+
+
+@pytest.mark.parametrize("method", ["auto", "bmfr"])
+def test_a_method_without_stages_needs_the_whole_frame(method):
+    with pytest.raises(ValueError, match=f"{method} needs the whole frame in memory: raise --mem"):
+        tile_for(8192, 16384, 1 << 30, 1, method_of(method))

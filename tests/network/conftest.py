@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from jflnr.frame import Frame, write_frame
-from jflnr.network import flnr as regression
 from jflnr.network.examples import Crop, Example, draw, read
+from jflnr.network.flnr import init
 
 if TYPE_CHECKING:
     from jflnr.network.train import Settings
@@ -45,7 +45,7 @@ def scene() -> Scene:
 @pytest.fixture(scope="session")
 def params() -> dict[str, jax.Array]:
     """Random weights, also where training starts from zero."""
-    start = regression.init(jax.random.key(0), WIDTHS)
+    start = init(jax.random.key(0), WIDTHS)
     keys = jax.random.split(jax.random.key(1), len(start))
     noise = (0.1 * jax.random.normal(k, start[n].shape) for k, n in zip(keys, start, strict=True))
     return {name: start[name] + more for name, more in zip(start, noise, strict=True)}

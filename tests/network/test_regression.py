@@ -4,13 +4,14 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.network import flnr as regression
+from jflnr.network import flnr as networks
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
-from tests.flnr.conftest import WIDTHS, scene_of
+from tests.network.conftest import WIDTHS, scene_of
 
-flnr = jax.jit(
-    lambda target, guides, params, weight: regression.flnr(target, guides, params, weight=weight)
-)
+
+@jax.jit
+def flnr(target, guides, params, weight):
+    return networks.flnr(target, guides, params=params, weight=weight)
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +25,14 @@ def denoised(scene, params, everywhere):
 
 
 def test_untrained_it_is_adaptive_flr(scene, everywhere):
-    start = regression.init(jax.random.key(0), WIDTHS)
+    start = networks.init(jax.random.key(0), WIDTHS)
     ours = flnr(*scene, start, everywhere)
     wanted = jax.jit(flr_adaptive)(*scene, AdaptiveFLR(), weight=everywhere)
     np.testing.assert_allclose(ours, wanted, atol=1e-5)
 
 
 def test_weights_change_the_result(scene, params, denoised, everywhere):
-    start = regression.init(jax.random.key(0), WIDTHS)
+    start = networks.init(jax.random.key(0), WIDTHS)
     assert np.abs(denoised - flnr(*scene, start, everywhere)).max() > 0.05
 
 

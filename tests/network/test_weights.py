@@ -7,7 +7,8 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.network import regression, weights
+from jflnr.network import weights
+from jflnr.network.flnr import init
 
 WIDTHS = (4, 8)
 
@@ -15,7 +16,7 @@ WIDTHS = (4, 8)
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "network.npz"
-    weights.save(path, regression.init(jax.random.key(0), WIDTHS), WIDTHS, steps=7)
+    weights.save(path, init(jax.random.key(0), WIDTHS), WIDTHS, steps=7)
     return path
 
 
@@ -31,7 +32,7 @@ def header(text):
 
 def test_what_is_saved_is_loaded_in_half_precision(file):
     loaded, about = weights.load(file)
-    start = regression.init(jax.random.key(0), WIDTHS)
+    start = init(jax.random.key(0), WIDTHS)
     assert loaded.keys() == start.keys()
     for name in start:
         np.testing.assert_allclose(loaded[name], start[name], rtol=1e-3, atol=1e-6)

@@ -23,7 +23,7 @@ MOST = 8
 
 @functools.cache
 def by_jax(**options: Any) -> Callable[..., np.ndarray]:
-    program = functools.partial(jax_adaptive, parameters=PARAMETERS, **options)
+    program = functools.partial(jax_adaptive, method=PARAMETERS, **options)
     compiled = jax.jit(program)
     return lambda *arrays, **named: np.asarray(compiled(*arrays, **named))
 

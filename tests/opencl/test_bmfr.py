@@ -4,7 +4,6 @@ import dataclasses
 import types
 from typing import Any
 
-import jax
 import numpy as np
 import pytest
 
@@ -17,7 +16,6 @@ from tests.opencl import tolerances
 from tests.opencl.conftest import error
 from tests.temporal.bmfr_shot import shot
 
-step = jax.jit(bmfr.step, static_argnames="parameters")
 # In the first frame `fitted` is phase II alone.
 PHASES = {"light": "I", "samples": "I", "fitted": "II and III", "picture": "III"}
 
@@ -36,13 +34,13 @@ def frames() -> list[jflnr.Frame]:
     return frames
 
 
-def compare(context: Context, frames: list[jflnr.Frame], **parameters: Any) -> None:
+def compare(context: Context, frames: list[jflnr.Frame], **options: Any) -> None:
     """Both over the same frames, each with its own history."""
-    settings = bmfr.BMFR(**parameters)
+    settings = bmfr.BMFR(**options)
     ours, right = kernels.start(frames[0], context), bmfr.start(frames[0])
     for frame in frames:
         ours, found = kernels.step(ours, frame, settings, context=context)
-        right, image = step(right, frame, settings)
+        right, image = bmfr.step(right, frame, settings)
         assert error(found, np.asarray(image)) < tolerances.BMFR
         for name, phase in PHASES.items():
             one, other = getattr(ours, name).get(), np.asarray(getattr(right, name))

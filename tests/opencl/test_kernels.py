@@ -103,7 +103,7 @@ def test_solve(context: Context, counts: tuple[int, int]) -> None:
         PARAMETERS,
         *counts,
     ).get()[..., : moments.shape[2]]
-    right = in_float64(jax_solve.solve, parameters=PARAMETERS, channels=counts[1])(moments, shift)
+    right = in_float64(jax_solve.solve, method=PARAMETERS, channels=counts[1])(moments, shift)
     assert per_plane(found, right) < tolerances.SOLVE
     assert not found[..., 3, 4].any()
 

@@ -19,8 +19,8 @@ from tests.oracle.flr_numpy import flr as numpy_flr
 def compare(context: Context, target: np.ndarray, guides: Any, **options: Any) -> float:
     """The error against the regression by plain loops in numpy, which compiles nothing.
 
-    tests/flr compares JAX with the same loops. Pixels that are not finite have weight 0 in them,
-    and are left out of the comparison.
+    tests/regression compares JAX with the same loops. Pixels that are not finite have weight 0 in
+    them, and are left out of the comparison.
     """
     found = flr(target, guides, PARAMETERS, context=context, **options)
     assert found.dtype == np.float32
@@ -30,7 +30,7 @@ def compare(context: Context, target: np.ndarray, guides: Any, **options: Any) -
     weight = np.float64(options.pop("weight", np.ones(target.shape[:2])))
     good = np.isfinite(x).all(2) & np.isfinite(target).all(2) & (weight > 0)
     x, y = (np.where(good[..., None], image, 0) for image in (x, np.float64(target)))
-    sigma, eps, eps_prime = (float(p) for p in np.exp(PARAMETERS))
+    sigma, eps, eps_prime = PARAMETERS.sigma, PARAMETERS.eps, PARAMETERS.eps_prime
     # The window is given in pixels of the output, the loops count in pixels of the target.
     sigma *= target.shape[0] / round(found.shape[0] / 2) / 2 if "guides_map" in options else 1
     right = numpy_flr(y, x, sigma, eps, eps_prime, weight=np.where(good, weight, 0), **options)
@@ -45,7 +45,7 @@ CHANNELS = [3, 1, 9, 2, 4, 3, 6, 5, 8, 7, 2, 1, 3]
 def test_counts(context: Context) -> None:
     """Every Q and C against one JAX program: a guide or target that is zero changes nothing."""
     target, guides = scene(43, 101, 12, 9)
-    program = in_float64(jax_flr, parameters=PARAMETERS)
+    program = in_float64(jax_flr, method=PARAMETERS)
     for count, channels in enumerate(CHANNELS):
         found = flr(target[..., :channels], guides[..., :count], PARAMETERS, context=context)
         right = program(target, np.where(np.arange(12) < count, guides, 0))[..., :channels]
@@ -167,7 +167,7 @@ def test_driven_as_a_gpu(gpu_like: Context, dtype: type) -> None:
 
 
 def test_real_frames(context: Context, data: Path) -> None:
-    program = in_float64(jax_flr, parameters=DEFAULT)
+    program = in_float64(jax_flr, method=DEFAULT)
     for path in sorted(data.glob("*/*.exr")):
         frame = jflnr.read_frame(path, spp=1)
         layers = tuple(np.asarray(a) for a in guide_layers.layers(frame, guide_layers.DEFAULT))

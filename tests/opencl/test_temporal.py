@@ -12,16 +12,15 @@ import jflnr
 from jflnr import temporal
 from jflnr.denoising import SHIPPED_FRAME
 from jflnr.images.inputs import prepare, robust_images
+from jflnr.methods import method_of
 from jflnr.opencl import Context, flnr, flr_adaptive, smooth_guide
 from jflnr.opencl import temporal as kernels
 from jflnr.temporal.change import BLOCK
-from jflnr.temporal.sequence import parameters_of
 from tests.opencl import tolerances
 from tests.opencl.conftest import error
 from tests.temporal.bmfr_shot import shot
 
 GUIDES = ("normal", "depth")
-step = jax.jit(temporal.step, static_argnames=("method", "guides"))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +42,7 @@ def compare(context: Context, frames: list[jflnr.Frame]) -> None:
     height, width = (-(-size // BLOCK) for size in frames[0].indirect.shape[:2])
     for frame in frames:
         ours, found = kernels.step(ours, frame, "flr", guides=GUIDES, context=context)
-        right, image = step(right, frame, "flr", guides=GUIDES)
+        right, image = temporal.step(right, frame, "flr", guides=GUIDES)
         assert error(found, np.asarray(image)) < tolerances.ADAPTIVE
         for one, other in zip(
             (*ours.light, *ours.image), (*right.light, *right.image), strict=True
@@ -66,11 +65,11 @@ def test_the_first_frame_is_denoised_as_by_itself(
     frame = dataclasses.replace(frame, motion=np.zeros((64, 96, 2), np.float32))
     found = kernels.step(kernels.start(frame, context), frame, method, context=context)[1]
     smooth = functools.partial(smooth_guide, context=context)
-    images = robust_images(*prepare(frame, None)[::-1], smooth=smooth)
+    images = robust_images(*prepare(frame, None, method_of(method))[::-1], smooth=smooth)
     right = alone(
         images["target"],
         images["guides"],
-        parameters_of(method, None),
+        method_of(method),
         weight=images["weight"],
         context=context,
     )

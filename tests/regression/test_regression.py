@@ -222,9 +222,10 @@ X, Y = np.zeros((8, 9, 2), np.float32), np.zeros((8, 9, 3), np.float32)
         ({"guides_map": np.zeros((12, 13, 2), np.float32)}, ValueError, "guides_map"),
         ({"guides_map": np.zeros((8, 9, 3), np.float32)}, ValueError, "guides_map"),
         ({"solver": "magic"}, ValueError, "solver"),
+        ({"levels": 2}, TypeError, "levels"),
     ],
 )
 def test_wrong_arguments_are_named(change, error, words):
-    arguments = {"target": Y, "guides": X, "parameters": PARAMETERS} | change
+    arguments = {"target": Y, "guides": X, "method": PARAMETERS} | change
     with pytest.raises(error, match=words):
         uncompiled(**arguments)

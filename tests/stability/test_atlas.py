@@ -12,7 +12,7 @@ from experiments.stability.cases import CASES, make
 from experiments.stability.measures import measure, passes
 from experiments.stability.methods import EXACT, METHODS, ON_DEVICE
 from jflnr.opencl import flr as on_device
-from jflnr.regression.flr import flr
+from jflnr.regression.flr import FLR, flr
 
 MANY = "16 guides, rank 5"
 FIVE_GUIDES = [case for case in CASES if case != MANY]
@@ -92,11 +92,11 @@ LOGARITHMS = [(2.0, -1e3, -1e3), (2.0, 1e3, 1e3)]
 def test_equal_guides_without_regularisation(rng, size, logarithms):
     y = rng.random((11, 13, 1), np.float32)
     x = np.repeat(size * rng.standard_normal((11, 13, 1)), 2, axis=-1).astype(np.float32)
-    light, slopes = _unregularised()(y, x, Parameters(*map(np.float32, logarithms)))
+    light, slopes = _unregularised()(y, x, FLR(*np.exp(np.float32(logarithms))))
     assert np.isfinite(light).all() and np.abs(light).max() < 3
     assert all(np.isfinite(slope).all() for slope in jax.tree.leaves(slopes))
     _needs_a_device()
-    light = on_device(y, x, Parameters(*logarithms), block=4, support=16)
+    light = on_device(y, x, FLR(*np.exp(np.float32(logarithms))), block=4, support=16)
     assert np.isfinite(light).all() and np.abs(light).max() < 3
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
-from jflnr.network.flnr import flnr
+from jflnr.network.flnr import FLNR, flnr
 from jflnr.network.weights import shipped
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.flr import DEFAULT, flr
@@ -19,19 +19,19 @@ FIVE_GUIDES = [case for case in CASES if "16" not in case]
 
 @functools.cache
 def gradient(method):
-    def mean(target, guides, parameters, usable, unit):
+    def mean(target, guides, numbers, usable, unit):
         # Of the light relative to the input: of light near the type's maximum a derivative that is
         # above 1 is beyond it.
-        light = method(target, guides, parameters, weight=usable) / unit
+        light = method(target, guides, numbers, weight=usable) / unit
         ramp = jnp.linspace(-1, 1, light.size).reshape(light.shape)
         return jnp.mean(light * ramp)
 
     return jax.jit(jax.grad(mean, argnums=(0, 1, 2)))
 
 
-def is_finite(method, case, parameters, channels):
+def is_finite(method, case, numbers, channels):
     made = make(case, *SIZE, np.float32)
-    arrays = made.target[..., channels], made.guides, jax.tree.map(np.float32, parameters)
+    arrays = made.target[..., channels], made.guides, jax.tree.map(np.float32, numbers)
     unit = max(np.abs(made.target).max(), np.finfo(np.float32).tiny)
     found = gradient(method)(*jax.tree.map(jnp.asarray, arrays), made.usable, unit)
     for leaf in jax.tree.leaves(found):
@@ -65,11 +65,11 @@ def test_flr_adaptive(case):
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
 @pytest.mark.parametrize("case", FIVE_GUIDES)
 def test_flnr(case):
-    is_finite(flnr, case, shipped("flnr-tiny"), np.array([0, 0, 0]))
+    is_finite(flnr, case, FLNR(params=shipped("flnr-tiny")), np.array([0, 0, 0]))
 
 
 @pytest.mark.parametrize(
-    ("method", "parameters"),
+    ("method", "numbers"),
     [
         (wide_flr, DEFAULT),
         (flr_adaptive, AdaptiveFLR()),
@@ -77,11 +77,11 @@ def test_flnr(case):
         (flr_adaptive, AdaptiveFLR(sigma=0.4)),
     ],
 )
-def test_far_from_all_light(method, parameters):
+def test_far_from_all_light(method, numbers):
     """Windows that reach no usable pixel at all, as in a wide sky."""
     made = make("ordinary", 16, 240, np.float32)
     usable = np.arange(240) < 40
-    arrays = made.target[..., :1], made.guides, jax.tree.map(np.float32, parameters)
+    arrays = made.target[..., :1], made.guides, jax.tree.map(np.float32, numbers)
     weight = jnp.asarray(np.broadcast_to(usable, (16, 240)))
     found = gradient(method)(*jax.tree.map(jnp.asarray, arrays), weight, 1)
     for leaf in jax.tree.leaves(found):

@@ -9,11 +9,11 @@ import pytest
 
 import jflnr
 from jflnr import denoising
-from jflnr.temporal import bmfr, bmfr_taa
+from jflnr.bmfr import pipeline as bmfr
+from jflnr.bmfr import taa as bmfr_taa
 from tests.temporal.bmfr_shot import STEP, shot
 
 SIZE = (40, 56)
-step = jax.jit(bmfr.step, static_argnames="parameters")
 
 
 def changed(frame, **layers):
@@ -24,11 +24,11 @@ def plain(frame):
     return changed(frame, albedo=np.ones_like(frame.albedo))
 
 
-def run(frames, parameters=bmfr.PAPER):
+def run(frames, method=bmfr.PAPER):
     """The last history and all images."""
     history, images = bmfr.start(frames[0]), []
     for frame in frames:
-        history, image = step(history, frame, parameters)
+        history, image = bmfr.step(history, frame, method)
         images.append(np.asarray(image))
     return history, np.stack(images)
 
@@ -155,8 +155,9 @@ def test_denoise_is_the_first_step(room):
     ("layers", "options", "error", "words"),
     [
         ({}, {"guides": ("normal",)}, ValueError, "own features"),
-        ({}, {"block": 16}, ValueError, "own features and blocks"),
-        ({}, {"parameters": jflnr.FLR(8, 1e-3, 1e-3)}, TypeError, "BMFR"),
+        ({}, {"sigma": 8}, TypeError, "bmfr has no sigma; it has noise"),
+        ({}, {"block": 0}, ValueError, "block must be at least 1"),
+        ({}, {"tile": 16}, ValueError, "does not work in tiles"),
         ({"indirect": np.ones((40, 56, 6), np.float32)}, {}, ValueError, "3 channels"),
         ({"motion": np.ones((40, 55, 2), np.float32)}, {}, ValueError, "motion is 55 x 40"),
     ],
