@@ -40,6 +40,7 @@ NAMES = (
     "predictions",
     "large",
     "throughput",
+    "threads",
     "accumulated",
     "sequences",
     "sequence_speed",

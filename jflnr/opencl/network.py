@@ -74,7 +74,7 @@ def flnr(
     if keep_energy:
         rescale(context, image, images[0], weight, output)
     if unit != 1:
-        output *= unit
+        context.scale(output, unit)
     return context.finish(output, result)
 
 
