@@ -1,12 +1,18 @@
-"""Writing files so that nothing is ever half-written."""
+"""Writing files so that nothing is ever half-written, and bounds for what is read from them."""
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, BinaryIO
+
+# Deeper than any JSON of ours or of a renderer; what is deeper cannot be written again either.
+DEEPEST = 50
 
 
 @contextmanager
@@ -31,3 +37,25 @@ def write_atomically(path: str | Path, data: bytes) -> None:
     """Write `data` to `path`, whole or not at all."""
     with replacing(path) as beside:
         beside.write_bytes(data)
+
+
+def json_object(text: str | bytes) -> dict[str, Any]:
+    """The JSON object that `text` is, which nobody vouches for; {} if it is none."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) and not _deeper(found, DEEPEST) else {}
+
+
+def _deeper(value: Any, levels: int) -> bool:
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return levels == 0 or any(_deeper(item, levels - 1) for item in items)
+
+
+def unpacked_size(archive: BinaryIO) -> int:
+    """Bytes that the members of a .npz unpack to, by its directory; numpy reads no more of them."""
+    with zipfile.ZipFile(archive) as members:
+        size = sum(member.file_size for member in members.infolist())
+    archive.seek(0)
+    return size

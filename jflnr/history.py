@@ -10,9 +10,11 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from jflnr.files import replacing
+from jflnr.files import json_object, replacing, unpacked_size
 
 FORMAT = "jflnr-history"
+# What a file says besides the arrays.
+ABOUT = {"options": dict, "last": list, "header": dict}
 
 
 class History(NamedTuple):
@@ -29,7 +31,8 @@ class History(NamedTuple):
         """
         leaves, structure = jax.tree.flatten(like)
         wanted, found = ([np.shape(leaf) for leaf in some] for some in (leaves, self.arrays))
-        if wanted != found:
+        numbers = all(array.dtype.kind in "biuf" for array in self.arrays)
+        if wanted != found or not numbers:
             raise ValueError(
                 f"{self.path} is of frames of another size or with other layers than this one"
             )
@@ -41,13 +44,18 @@ def read(path: Path) -> History:
     """The history in a file. Raises `OSError` and, if it is no such file, `ValueError`."""
     with path.open("rb") as file:
         try:
+            # It is written without compression.
+            if unpacked_size(file) > path.stat().st_size:
+                raise ValueError("compressed")
             with np.load(file, allow_pickle=False) as stored:
-                about = json.loads(str(stored[FORMAT]))
+                about = json_object(str(stored[FORMAT]))
                 arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
         except Exception:  # damaged archives fail in many ways, some undocumented
             raise ValueError(
                 f"{path} is not a history that --history wrote, or is damaged"
             ) from None
+    if not all(isinstance(about.get(name), kind) for name, kind in ABOUT.items()):
+        raise ValueError(f"{path} does not say what history it is: {', '.join(ABOUT)} are wanted")
     return History(path, about, arrays)
 
 

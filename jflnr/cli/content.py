@@ -67,7 +67,7 @@ def _model_of(frame: "Frame", settings: dict[str, Any]) -> dict[str, Any]:
 def not_finite_pixels(frame: "Frame") -> list[str]:
     from jflnr.frame import not_finite
 
-    if not (counts := not_finite(frame)):
-        return []
+    counts, why = not_finite(frame), layouts.denoised(vars(frame))[1]
     listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
-    return [f"pixels that are NaN or infinite (the fit leaves them out): {listed}"]
+    said = f"pixels that are NaN or infinite (the fit leaves them out): {listed}"
+    return [*([said] if counts else []), *([why] if why else [])]

@@ -9,7 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jflnr.files import replacing
+from jflnr.files import json_object, replacing, unpacked_size
 
 
 def save_state(path: Path, state: Any, history: list, run: dict[str, Any]) -> None:
@@ -27,15 +27,22 @@ def load_state(path: Path, like: Any, run: dict[str, Any]) -> tuple[Any, list]:
 
     Raises `ValueError` if the file is no state, or one of another run.
     """
+    wanted, structure = jax.tree.flatten(like)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            header = json.loads(file["header"].tobytes())
-            leaves = [file[f"leaf{i}"] for i in range(len(file.files) - 1)]
-    except (OSError, ValueError, KeyError) as error:
+        with path.open("rb") as opened:
+            if unpacked_size(opened) > path.stat().st_size:  # it is written without compression
+                raise ValueError("compressed")
+            with np.load(opened, allow_pickle=False) as file:
+                header = json_object(file["header"].tobytes())
+                leaves = [file[f"leaf{i}"] for i in range(len(file.files) - 1)]
+    except Exception as error:  # damaged archives fail in many ways, some undocumented
         raise ValueError(f"{path}: not the state of a training run ({error})") from None
-    if header["run"] != run:
+    if header.get("run") != run:
         raise ValueError(
-            f"{path}: the state of another run ({header['run']}); this one is {run}. "
+            f"{path}: the state of another run ({header.get('run')}); this one is {run}. "
             "Remove the file to begin anew"
         )
-    return jax.tree.unflatten(jax.tree.structure(like), leaves), header["history"]
+    same = [np.shape(leaf) for leaf in wanted] == [leaf.shape for leaf in leaves]
+    if not same or not isinstance(header.get("history"), list):
+        raise ValueError(f"{path}: its arrays are not those of this run. Remove the file")
+    return jax.tree.unflatten(structure, leaves), header["history"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jflnr.files import replacing
+from jflnr.files import json_object, replacing, unpacked_size
 from jflnr.flnr import features, regression, unet
 
 FORMAT, VERSION = "jflnr network", 2
@@ -71,9 +70,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
         raise ValueError(f"{path}: there is no such file; {wanted}")
     with path.open("rb") as file:
         try:
-            with zipfile.ZipFile(file) as archive:
-                size = sum(entry.file_size for entry in archive.infolist())
-            file.seek(0)
+            size = unpacked_size(file)
             with np.load(file, allow_pickle=False) as stored:
                 if size <= LARGEST:
                     return {name: stored[name] for name in stored.files}
@@ -83,13 +80,11 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _header(path: str | Path, text: np.ndarray | None) -> dict[str, Any]:
-    try:
-        header = json.loads(b"" if text is None else text.tobytes())
-    except (ValueError, RecursionError):
-        header = None
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
+    header = json_object(b"" if text is None else text.tobytes())
+    if header.get("format") != FORMAT:
         raise ValueError(f"{path}: not a file of weights that `jflnr train` wrote")
-    for name, wanted in (("version", VERSION), ("features", features.COUNT)):
+    known = {"version": VERSION, "features": features.COUNT, "guides": list(features.GUIDES)}
+    for name, wanted in known.items():
         if header.get(name) != wanted:
             raise ValueError(
                 f"{path}: {name} is {header.get(name)}; this jflnr reads {wanted}, so train anew"

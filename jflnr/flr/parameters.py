@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jflnr import checks
 from jflnr.flr.adaptive_parameters import AdaptiveParameters
 
 FORMAT = "jflnr-parameters"
@@ -102,12 +103,25 @@ def load_parameters(path: str | Path) -> tuple[Parameters | AdaptiveParameters, 
     method = text.get("method", "flr")
     if method not in list(NUMBERS):
         raise ValueError(f"{path}: its method is {method!r}; it should be {' or '.join(NUMBERS)}")
-    try:
-        values = {name: float(text[name]) for name in NUMBERS[method]}
-    except (KeyError, TypeError, ValueError, OverflowError):
+    values = {name: text.get(name) for name in NUMBERS[method]}
+    if not all(type(value) in (int, float) for value in values.values()):
         raise ValueError(
             f"{path}: {', '.join(NUMBERS[method])} must all be there as numbers; "
             f"it should be {wanted}"
-        ) from None
+        )
     kind = Parameters if method == "flr" else AdaptiveParameters
-    return kind.of(**values), text
+    try:
+        _check_use(text)
+        return kind.of(**values), text
+    except (ValueError, TypeError, OverflowError) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _check_use(about: dict[str, Any]) -> None:
+    """Raise unless the guides and the block that a file names, if it does, are such."""
+    from jflnr.guides import NAMES
+
+    guides = about.get("guides", [])
+    if not isinstance(guides, list) or not all(guide in NAMES for guide in guides):
+        raise ValueError(f"guides must be a list of names out of {', '.join(NAMES)}; got {guides}")
+    checks.positive_integer("block", about.get("block", 1))

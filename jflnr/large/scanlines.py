@@ -16,7 +16,6 @@ from jflnr import exr, layouts
 from jflnr.files import replacing
 from jflnr.frame import Frame
 from jflnr.large.source import Rows
-from jflnr.layouts.override import override
 from jflnr.layouts.source import recognise
 
 # Rows that are decoded at a time; every compression packs a divisor of it together.
@@ -55,9 +54,7 @@ class Scanlines:
             )
         self.height, self.width, self.channels = spec.height, spec.width, spec.channelnames
         nothing = dict.fromkeys(self.channels, np.zeros((1, 1)))
-        self.layout = recognise(nothing, spp)
-        if names:
-            self.layout = override(self.layout, nothing, names, path)
+        self.layout = recognise(nothing, spp, names, path)
         if len(nothing) > len(self.channels):
             raise ValueError(f"{path}: --map to another file needs both whole: raise --memory")
 

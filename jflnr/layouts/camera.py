@@ -24,7 +24,7 @@ class Camera(NamedTuple):
                 return cls(np.linalg.inv(to_camera), None)
             matrix = np.array(header["camera_to_world"], np.float64).reshape(4, 4)
             return cls(matrix, float(header["fov_x_degrees"]))
-        except (KeyError, TypeError, ValueError, np.linalg.LinAlgError):
+        except (KeyError, TypeError, ValueError, OverflowError, np.linalg.LinAlgError):
             return None
 
     def depth(self, position: np.ndarray, hit: np.ndarray) -> np.ndarray:
