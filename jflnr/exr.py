@@ -6,6 +6,7 @@ Whatever is wrong with a file is raised as OSError or ValueError, in one sentenc
 """
 
 import contextlib
+import errno
 import io
 import os
 import struct
@@ -135,11 +136,12 @@ def write_channels(
     if comments is not None:
         header["comments"] = comments
     contiguous = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
-    try:
-        with replacing(path) as beside, _silence():
-            OpenEXR.File(header, contiguous).write(str(beside))
-    except (OSError, RuntimeError) as error:  # OpenEXR raises RuntimeError when the disk is full
-        raise OSError(f"{path} cannot be written: {getattr(error, 'strerror', error)}") from None
+    with replacing(path) as beside, _silence():
+        try:
+            OpenEXR.File(header, contiguous).write(os.fsencode(beside))
+        except RuntimeError as error:  # 'Cannot open image file "...". No space left on device.'
+            why = str(error).rpartition('". ')[2].rstrip(".")
+            raise OSError(errno.EIO, why) from None
 
 
 class _Part(NamedTuple):
@@ -153,7 +155,7 @@ def _read_parts(path: Path, header_only: bool) -> list[_Part]:
     _check_file(path)
     with _silence():
         try:
-            file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+            file = OpenEXR.File(os.fsencode(path), separate_channels=True, header_only=header_only)
             return [
                 _Part(
                     part.name(),
@@ -171,6 +173,8 @@ def _check_file(path: Path) -> None:
         raise FileNotFoundError(f"{path}: there is no such file")
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a folder, not an EXR file")
+    if not path.is_file():
+        raise OSError(f"{path} is a pipe or a device, not an EXR file")
     try:
         with path.open("rb") as file:
             start = file.read(len(MAGIC))

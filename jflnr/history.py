@@ -41,19 +41,15 @@ class History(NamedTuple):
 
 
 def read(path: Path) -> History:
-    """The history in a file. Raises `OSError` and, if it is no such file, `ValueError`."""
-    with path.open("rb") as file:
-        try:
-            # It is written without compression.
-            if unpacked_size(file) > path.stat().st_size:
-                raise ValueError("compressed")
-            with np.load(file, allow_pickle=False) as stored:
-                about = json_object(str(stored[FORMAT]))
-                arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
-        except Exception:  # damaged archives fail in many ways, some undocumented
-            raise ValueError(
-                f"{path} is not a history that --history wrote, or is damaged"
-            ) from None
+    """The history in a file. Raises `ValueError` if it is no such file."""
+    try:
+        if unpacked_size(path) > path.stat().st_size:  # it is written without compression
+            raise ValueError("compressed")
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            about = json_object(str(stored[FORMAT]))
+            arrays = [stored[f"array{i}"] for i in range(len(stored.files) - 1)]
+    except Exception:  # damaged archives fail in many ways, some undocumented
+        raise ValueError(f"{path} is not a history that --history wrote, or is damaged") from None
     if not all(isinstance(about.get(name), kind) for name, kind in ABOUT.items()):
         raise ValueError(f"{path} does not say what history it is: {', '.join(ABOUT)} are wanted")
     return History(path, about, arrays)

@@ -82,13 +82,12 @@ class Denoiser:
         return self.kept(job) or self.load(job)
 
     def kept(self, job: Job) -> Record | None:
-        """The record of a frame whose output is there and stays."""
+        """The record of a frame of which all is there that was asked for."""
         wanted = {job.preview: self.arguments.png, job.explanation: self.arguments.explain}
         outputs = [job.target, *(path for path, asked in wanted.items() if asked)]
-        kept = [str(path) for path in outputs if path.exists()]
-        if not kept or self.arguments.overwrite:
+        if self.arguments.overwrite or not all(path.exists() for path in outputs):
             return None
-        return _record(job) | {"status": "kept", "kept": kept}
+        return _record(job) | {"status": "kept", "kept": [str(path) for path in outputs]}
 
     def load(self, job: Job) -> Loaded | Record:
         """As `read`, also of a frame whose output is there."""
@@ -218,22 +217,24 @@ def _record(job: Job) -> Record:
 
 
 def _write(done: Denoised, arguments: argparse.Namespace) -> None:
-    """Write the preview, if asked for, and the EXR, with the input's header and windows."""
+    """Write what is not there: the EXR, with the input's header and windows, then the preview."""
     from jflnr import exr
     from jflnr.cli.preview import write_preview
     from jflnr.metrics import exposure
 
     job, source, frame, lights, error, about, _ = done
     picture = picture_of(frame, lights)
-    if arguments.png:
-        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        reflected = dataclasses.replace(frame, emission=None)
-        lit = picture_of(reflected, lights)
-        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
+    missing = lambda path: arguments.overwrite or not path.exists()
     mask = None if frame.mask is None else np.asarray(frame.mask)
     channels = layouts.output_channels(source, picture, lights, mask, arguments.channels)
     if error is not None:
         channels["error.Y"] = error[..., 0]
     comments = json.dumps(source.header | {"denoiser": about})
     attributes = source.attributes
-    exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
+    if missing(job.target):
+        exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
+    if arguments.png and missing(job.preview):
+        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
+        reflected = dataclasses.replace(frame, emission=None)
+        lit = picture_of(reflected, lights)
+        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))

@@ -29,12 +29,11 @@ def load_state(path: Path, like: Any, run: dict[str, Any]) -> tuple[Any, list]:
     """
     wanted, structure = jax.tree.flatten(like)
     try:
-        with path.open("rb") as opened:
-            if unpacked_size(opened) > path.stat().st_size:  # it is written without compression
-                raise ValueError("compressed")
-            with np.load(opened, allow_pickle=False) as file:
-                header = json_object(file["header"].tobytes())
-                leaves = [file[f"leaf{i}"] for i in range(len(file.files) - 1)]
+        if unpacked_size(path) > path.stat().st_size:  # it is written without compression
+            raise ValueError("compressed")
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            header = json_object(stored["header"].tobytes())
+            leaves = [stored[f"leaf{i}"] for i in range(len(stored.files) - 1)]
     except Exception as error:  # damaged archives fail in many ways, some undocumented
         raise ValueError(f"{path}: not the state of a training run ({error})") from None
     if header.get("run") != run:

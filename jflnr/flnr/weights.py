@@ -68,14 +68,13 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
     wanted = "it should be a file of weights that `jflnr train` wrote"
     if not path.exists():
         raise ValueError(f"{path}: there is no such file; {wanted}")
-    with path.open("rb") as file:
-        try:
-            size = unpacked_size(file)
-            with np.load(file, allow_pickle=False) as stored:
-                if size <= LARGEST:
-                    return {name: stored[name] for name in stored.files}
-        except Exception:  # damaged archives fail in many ways, some undocumented
-            raise ValueError(f"{path}: cannot be read, or is damaged; {wanted}") from None
+    try:
+        size = unpacked_size(path)
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            if size <= LARGEST:
+                return {name: stored[name] for name in stored.files}
+    except Exception:  # damaged archives fail in many ways, some undocumented
+        raise ValueError(f"{path}: cannot be read, or is damaged; {wanted}") from None
     raise ValueError(f"{path}: unpacks to more than any network here needs; {wanted}")
 
 

@@ -103,7 +103,7 @@ def load_parameters(path: str | Path) -> tuple[Parameters | AdaptiveParameters, 
     method = text.get("method", "flr")
     if method not in list(NUMBERS):
         raise ValueError(f"{path}: its method is {method!r}; it should be {' or '.join(NUMBERS)}")
-    values = {name: text.get(name) for name in NUMBERS[method]}
+    values: dict[str, Any] = {name: text.get(name) for name in NUMBERS[method]}
     if not all(type(value) in (int, float) for value in values.values()):
         raise ValueError(
             f"{path}: {', '.join(NUMBERS[method])} must all be there as numbers; "

@@ -23,9 +23,7 @@ BEAUTY = ("", "beauty", "composite", "rgba", "rgb", "color")
 NOTE = "the picture is divided by albedo and denoised; where the names mislead, use --map"
 
 
-def layout(
-    channels: Mapping[str, np.ndarray], mapped: Mapping[str, tuple[str, ...]]
-) -> Layout | None:
+def layout(channels: Mapping[str, np.ndarray], mapped: dict[str, tuple[str, ...]]) -> Layout | None:
     """None unless there are a picture and an albedo, by such names or as the user says."""
     names = find(channels) | mapped
     if not {"beauty", "albedo"} <= set(names):

@@ -33,7 +33,7 @@ def find(
 
 
 def override(
-    layout: Layout, mapped: Mapping[str, tuple[str, ...]], channels: Collection[str]
+    layout: Layout, mapped: dict[str, tuple[str, ...]], channels: Collection[str]
 ) -> Layout:
     """`layout` with what the user maps of a file that holds `channels`."""
     names = dict(layout.channels)

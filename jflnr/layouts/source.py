@@ -72,6 +72,6 @@ def picture(channels: Mapping[str, np.ndarray], source: str) -> np.ndarray:
 
     Raises ValueError, naming `source`, if there is none.
     """
-    names = tuple("RGB") if "R" in channels else recognise(channels).picture[:3]
+    names = tuple("RGB") if "R" in channels else recognise(dict(channels)).picture[:3]
     advice = f"there is no picture in it; {present(channels)}"
     return layer(channels, "beauty", names or tuple("RGB"), source, advice)
