@@ -106,6 +106,17 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
     return channels
 
 
+def check_aligned(*paths: PathLike) -> None:
+    """Raise ValueError unless the pixels of all files are those of the same data window."""
+    (first, origin), *others = [(path, read_attributes(path).window.origin) for path in paths]
+    for other, start in others:
+        if start != origin:
+            raise ValueError(
+                f"{first} starts at pixel {origin} and {other} at {start}: "
+                "they do not cover the same pixels"
+            )
+
+
 def write_channels(
     path: PathLike,
     channels: Mapping[str, np.ndarray],

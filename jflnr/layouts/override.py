@@ -49,6 +49,7 @@ def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) ->
     """The channels that `value` means; those of another file are added to `channels`."""
     if match := FILE.fullmatch(value):
         other = path.parent / match["file"].replace("{stem}", path.stem)
+        exr.check_aligned(path, other)
         read = exr.read_channels(other)
         found = _choose(read, name, match["name"] or "", str(other))
         borrowed = {f"{BORROWED}{other}:{channel}": read[channel] for channel in found}

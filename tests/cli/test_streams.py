@@ -157,3 +157,23 @@ def test_no_output_replaces_an_input(
     assert main(line.split()) == 2
     assert "would replace an input" in capsys.readouterr().err
     assert all((tmp_path / name).read_bytes() == frame for name in names)
+
+
+def test_pictures_of_other_pixels_are_not_compared(
+    tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture
+) -> None:
+    channels = exr.read_channels(frame_file)
+    picture = {c: channels[f"reference.{c}"] for c in "RGB"}
+    for name, shift in (("a", 0), ("b", 500)):
+        exr.write_channels(tmp_path / f"{name}.exr", picture, window=exr.Window((shift, 0)))
+    a, b, out = (str(tmp_path / name) for name in ("a.exr", "b.exr", "out"))
+    for argv in (
+        ["metrics", a, b],
+        ["metrics", b, str(frame_file)],
+        ["report", a, b, "-o", out],
+        ["report", a, "--reference", b, "-o", out],
+        ["denoise", str(frame_file), "-o", f"{out}.exr", "--map=albedo=b.exr"],
+    ):
+        assert main(argv) == 2
+        assert "do not cover the same pixels" in capsys.readouterr().err
+    assert main(["metrics", a, a]) == 0
