@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from jflnr import layouts
+from jflnr import exr, layouts
 from jflnr.cli.content import about_of, picture_of, split, spp_of, with_direct
 from jflnr.cli.jobs import Job
 from jflnr.frame import Frame, frame_of
 from jflnr.large import strips
-from jflnr.large.scanlines import Scanlines, writing
+from jflnr.large.scanlines import Scanlines
 from jflnr.large.source import Rows
 
 # What the picture is put together from, and what the regression always reads.
@@ -34,6 +34,7 @@ def denoise_in_strips(
     comments = json.dumps(first.header | {"denoiser": about})
     options = strips.options(settings, tuple(about["guides"]))
     size, window = (file.height, file.width), file.attributes.window
+    others = file.attributes.others
     with contextlib.ExitStack() as stack:
         append = None
         for top, light in strips.denoise(
@@ -41,7 +42,8 @@ def denoise_in_strips(
         ):
             channels = _channels(file, top, light, arguments)
             if append is None:
-                output = writing(job.target, size, list(channels), comments, window)
+                types = dict.fromkeys(channels, np.float32)
+                output = exr.writing_rows(job.target, size, types, comments, window, others)
                 append = stack.enter_context(output)
             append(channels)
     return {
