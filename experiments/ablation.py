@@ -14,11 +14,11 @@ import numpy as np
 
 import jflnr
 from experiments import data, plots, results
-from jflnr.flr.adaptive import flr_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
-from jflnr.flr.level import brightness
-from jflnr.flr.noisy_guides import smooth_guide
-from jflnr.flr.parameters import DEFAULT
+from jflnr.regression.adaptive import flr_adaptive
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
+from jflnr.regression.level import brightness
+from jflnr.regression.noisy_guides import smooth_guide
+from jflnr.regression.parameters import DEFAULT
 from jflnr.frame import Frame
 from jflnr.guides import layers
 from jflnr.metrics import measure

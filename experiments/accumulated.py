@@ -13,10 +13,10 @@ import numpy as np
 
 from experiments import plots, results, resume, shots
 from jflnr import temporal_metrics
-from jflnr.flr import adaptive, energy, widths
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.apply import apply, with_borders
-from jflnr.flr.moments import centre
+from jflnr.regression import adaptive, energy, widths
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.apply import apply, with_borders
+from jflnr.regression.moments import centre
 from jflnr.frame import Array, Frame
 from jflnr.inputs import adaptive_images, prepare
 from jflnr.temporal import Average, Surface, accumulate, find_taps, reproject

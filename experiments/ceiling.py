@@ -13,8 +13,8 @@ from scipy.stats import spearmanr
 import jflnr
 from experiments import data, resume
 from jflnr import exr
-from jflnr.selection.method import denoise_on_blocks
-from jflnr.selection.plan import COLLECTED
+from jflnr.auto.method import denoise_on_blocks
+from jflnr.auto.plan import COLLECTED
 
 # Sides in pixels of the squares over which errors are averaged before they are ranked.
 SIDES = (8, 16, 32, 64)

@@ -13,8 +13,8 @@ import numpy as np
 from experiments import plots, results
 from experiments.peers import guided
 from experiments.speed import interleaved, synthetic
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 from jflnr.temporal import bmfr_fit
 
 NAME = "complexity"

@@ -1,7 +1,7 @@
 """What error a local model may have, told without a reference, from sums over its window.
 
 All in numpy's float64 and for one channel, the brightness. Only `experiments.criterion` needs more
-than one of them: jflnr itself decides by Mallows' (`jflnr/selection/nested.py`).
+than one of them: jflnr itself decides by Mallows' (`jflnr/auto/nested.py`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jflnr.flr.moments import index_xx, index_xy
+from jflnr.regression.moments import index_xx, index_xy
 
 
 class Sums(NamedTuple):

@@ -13,9 +13,9 @@ from scipy.ndimage import correlate1d
 import jflnr
 from experiments import ceiling, criteria, data, plots, results, resume
 from experiments.ceiling import BLOCK, SIDES, rank
-from jflnr.flr.blur import gaussian_taps
-from jflnr.flr.level import brightness
-from jflnr.flr.moments import centre, collect, index_xy
+from jflnr.regression.blur import gaussian_taps
+from jflnr.regression.level import brightness
+from jflnr.regression.moments import centre, collect, index_xy
 from jflnr.inputs import flr_images
 
 NAME = "criterion"

@@ -16,12 +16,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr.denoising import Part, denoise_flr, support_of
-from jflnr.flr import adaptive, energy, widths
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.apply import apply, with_borders
-from jflnr.flr.floor import with_own_light
-from jflnr.flr.level import mean_guides
-from jflnr.flr.parameters import DEFAULT
+from jflnr.regression import adaptive, energy, widths
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.apply import apply, with_borders
+from jflnr.regression.floor import with_own_light
+from jflnr.regression.level import mean_guides
+from jflnr.regression.parameters import DEFAULT
 from jflnr.frame import Frame
 from jflnr.inputs import adaptive_images, flr_images
 from jflnr.large.scanlines import Scanlines

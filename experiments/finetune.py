@@ -10,8 +10,8 @@ import jax
 import numpy as np
 
 from experiments import data, noise, plots, results, resume
-from jflnr.flnr import examples, weights
-from jflnr.flnr.train import Settings, train
+from jflnr.network import examples, weights
+from jflnr.network.train import Settings, train
 from jflnr.frame import Frame
 from jflnr.inputs import frame_inputs
 

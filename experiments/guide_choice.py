@@ -15,8 +15,8 @@ from experiments import data, plots, results, resume
 from experiments.methods import Method
 from experiments.timing import times
 from experiments.tune import mean_psnr
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 from jflnr.frame import Array, Frame
 from jflnr.guides import NAMES
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from experiments import data, plots, results, resume, training
-from jflnr.flnr import examples
-from jflnr.flnr.train import CONFIGS, Settings, train
+from jflnr.network import examples
+from jflnr.network.train import CONFIGS, Settings, train
 
 NAME = "learning_curve"
 QUESTION = "What do more scenes, and more views of them, bring the network?"

@@ -11,9 +11,9 @@ import jaxopt
 import numpy as np
 
 from experiments import data, plots, results, resume, training
-from jflnr.flnr import loss, regression
-from jflnr.flnr.adam import Adam
-from jflnr.flnr.train import CONFIGS, Settings, rate_of
+from jflnr.network import loss, regression
+from jflnr.network.adam import Adam
+from jflnr.network.train import CONFIGS, Settings, rate_of
 
 NAME = "optimisers"
 QUESTION = "Which optimiser of jaxopt trains the network best in equal time?"

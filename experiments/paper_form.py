@@ -17,11 +17,11 @@ from experiments.table1 import PICTURE, mean_of, per_frame
 from experiments.timing import times
 from experiments.tune import quick_psnr
 from jflnr import denoise
-from jflnr.flnr import examples, features, loss, paper
-from jflnr.flnr.adam import Adam
-from jflnr.flnr.checkpoint import load_state, save_state
-from jflnr.flnr.train import Settings, rate_of
-from jflnr.flr.parameters import DEFAULT
+from jflnr.network import examples, features, loss, paper
+from jflnr.network.adam import Adam
+from jflnr.network.checkpoint import load_state, save_state
+from jflnr.network.train import Settings, rate_of
+from jflnr.regression.parameters import DEFAULT
 from jflnr.frame import Array, Frame
 from jflnr.inputs import adaptive_images, frame_inputs
 from jflnr.metrics import measure
@@ -45,7 +45,7 @@ class Trained(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A frame as it is read and judged; see `jflnr.flnr.examples.Example`."""
+    """A frame as it is read and judged; see `jflnr.network.examples.Example`."""
 
     light: Any
     guides: Any

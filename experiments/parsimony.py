@@ -15,13 +15,13 @@ from experiments import data, plots, results, resume
 from experiments.methods import Method
 from experiments.resume import ROOT
 from experiments.speed import interleaved
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 from jflnr.frame import Array, Frame
 from jflnr.guides import layers
 from jflnr.metrics import measure
-from jflnr.selection.method import denoise_on_blocks, plan_of
-from jflnr.selection.plan import BLOCKS
+from jflnr.auto.method import denoise_on_blocks, plan_of
+from jflnr.auto.plan import BLOCKS
 
 NAME = "parsimony"
 QUESTION = "Does method auto find the smallest model that is good enough, and what does it save?"

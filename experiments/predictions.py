@@ -1,6 +1,6 @@
 """How well does a look at a frame tell what each form of method auto reaches, and what it costs?
 
-Refits the constants of `jflnr/selection/plan.py`: they are in the page that this writes.
+Refits the constants of `jflnr/auto/plan.py`: they are in the page that this writes.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from experiments import data, plots, results, resume
 from experiments.ablation import has
 from experiments.resume import ROOT
 from jflnr.metrics import display, exposure, psnr
-from jflnr.selection import plan as plans
-from jflnr.selection.glance import is_simple
-from jflnr.selection.method import denoise_on_blocks
+from jflnr.auto import plan as plans
+from jflnr.auto.glance import is_simple
+from jflnr.auto.method import denoise_on_blocks
 
 NAME = "predictions"
 QUESTION = "How well does a look at a frame tell what each form of method auto reaches?"

@@ -15,11 +15,11 @@ from experiments import data, plots, resume
 from experiments.tune import quick_psnr
 from jflnr import guides
 from jflnr.denoising import BLOCK
-from jflnr.flr.apply import apply
-from jflnr.flr.blur import blur
-from jflnr.flr.moments import collect, index_xx, index_xy
-from jflnr.flr.parameters import DEFAULT, Parameters
-from jflnr.flr.solve import cholesky_solve, solve
+from jflnr.regression.apply import apply
+from jflnr.regression.blur import blur
+from jflnr.regression.moments import collect, index_xx, index_xy
+from jflnr.regression.parameters import DEFAULT, Parameters
+from jflnr.regression.solve import cholesky_solve, solve
 
 NAME = "regularisation"
 QUESTION = "How do accuracy and stability depend on eps and eps', and is Tikhonov as good?"

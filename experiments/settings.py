@@ -10,7 +10,7 @@ import numpy as np
 
 import jflnr
 from experiments.methods import Method, backends
-from jflnr.flr.parameters import DEFAULT, Parameters
+from jflnr.regression.parameters import DEFAULT, Parameters
 from jflnr.frame import Frame
 
 GUIDES = (("normal", "depth"), ("normal", "depth", "ao", "position"))

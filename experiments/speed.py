@@ -15,10 +15,10 @@ import numpy as np
 import jflnr
 from experiments import data, plots, results
 from jflnr import opencl
-from jflnr.flnr import weights
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.network import weights
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 from jflnr.guides import layers
 from jflnr.opencl.context import default_context
 from jflnr.opencl.profile import profile

@@ -12,7 +12,7 @@ from experiments import data, plots, results, resume
 from experiments.methods import basic, peers
 from experiments.peers import nfor
 from experiments.tune import mean_psnr
-from jflnr.flr.parameters import DEFAULT, Parameters
+from jflnr.regression.parameters import DEFAULT, Parameters
 from jflnr.frame import Array, Frame
 from jflnr.metrics import measure
 

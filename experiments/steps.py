@@ -12,11 +12,11 @@ import jflnr
 from experiments import data, plots
 from jflnr import guides
 from jflnr.denoising import BLOCK
-from jflnr.flr.apply import apply
-from jflnr.flr.blur import blur
-from jflnr.flr.moments import centre, collect, index_xy
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.solve import solve
+from jflnr.regression.apply import apply
+from jflnr.regression.blur import blur
+from jflnr.regression.moments import centre, collect, index_xy
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.solve import solve
 from jflnr.metrics import display, exposure
 
 NAME = "steps"

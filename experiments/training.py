@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments import data
 from experiments.resume import ROOT
-from jflnr.flnr import examples, loss, unet
+from jflnr.network import examples, loss, unet
 
 # Crops in a step of a stochastic method.
 BATCH = 4

@@ -40,3 +40,15 @@ def same_size(**images: Any) -> None:
     if len(set(sizes.values())) > 1:
         listed = ", ".join(f"{name} is {w} x {h}" for name, (h, w) in sizes.items())
         raise ValueError(f"Images must be of one size (width x height): {listed}")
+
+
+def times_finer(fine: tuple[int, ...], coarse: tuple[int, ...]) -> int | None:
+    """The smallest f with `coarse = ceil(fine / f)` in both directions; None if there is none."""
+    first = max(-(-f // c) for f, c in zip(fine, coarse, strict=True))
+    for factor in range(first, max(fine) + 1):
+        rows, columns = (-(-size // factor) for size in fine)
+        if (rows, columns) == coarse:
+            return factor
+        if rows < coarse[0] or columns < coarse[1]:
+            break
+    return None

@@ -4,7 +4,7 @@
 //   merged = coarser merged + share (fine - coarse)
 //
 // with everything coarse interpolated to the finer grid, and means taken under the window of the
-// coarser grid. jflnr/flr/merge.py says why.
+// coarser grid. jflnr/regression/merge.py says why.
 
 #include "vectors.h"
 #include "sizes.h"

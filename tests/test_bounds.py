@@ -10,8 +10,9 @@ import pytest
 from jflnr import history
 from jflnr.cli import main
 from jflnr.files import json_object
-from jflnr.flnr.checkpoint import load_state, save_state
-from jflnr.flr.parameters import DEFAULT, load_parameters, save_parameters
+from jflnr.methods import method_of
+from jflnr.network.checkpoint import load_state, save_state
+from jflnr.parameters import load_parameters, save_parameters
 
 ABOUT = {"options": {}, "last": ["a.exr", 1, 2], "header": {}}
 STATE = {"light": np.ones((4, 5, 3), np.float32)}
@@ -100,7 +101,7 @@ def test_a_parameter_file_says_what_is_wrong(
     tmp_path: Path, frame_file: Path, name: str, value: object, capsys: pytest.CaptureFixture
 ) -> None:
     path = tmp_path / "p.json"
-    save_parameters(path, DEFAULT, guides=["normal"], block=8)
+    save_parameters(path, method_of("flr"), guides=["normal"], block=8)
     assert load_parameters(path)[1]["guides"] == ["normal"]
     path.write_text(json.dumps(json.loads(path.read_text()) | {name: value}))
     with pytest.raises(ValueError, match=r"p\.json: "):

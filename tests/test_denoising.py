@@ -26,7 +26,7 @@ def test_agrees_with_an_independent_implementation_on_real_frames(data, name):
     published = json.loads((data / "baselines.json").read_bytes())["frames"][f"{name}.exr"]
     frame = jflnr.read_frame(data / f"{name}.exr")
     for sigma in (10, 24):
-        ours = jflnr.denoise(frame, parameters=jflnr.Parameters.of(sigma, 1e-3, 1e-4))
+        ours = jflnr.denoise(frame, parameters=jflnr.FLR(sigma, 1e-3, 1e-4))
         truth = published["1 spp"][f"flr sigma {sigma}"]["psnr"]
         assert psnr(frame, ours) == pytest.approx(truth, abs=0.02)
 
@@ -103,7 +103,7 @@ def test_gradients_reach_the_parameters(frame):
     def loss(parameters):
         return (jflnr.denoise(frame, parameters=parameters) ** 2).sum()
 
-    grads = jax.grad(loss)(jax.tree.map(np.float32, jflnr.Parameters.of(8, 1e-3, 1e-3)))
+    grads = jax.grad(loss)(jax.tree.map(np.float32, jflnr.FLR(8, 1e-3, 1e-3)))
     assert all(np.isfinite(g) and g != 0 for g in grads)
 
 
@@ -133,8 +133,8 @@ def test_the_adaptive_method_is_better_on_the_shipped_frame():
 
 
 def test_parameters_of_another_method_are_refused(frame):
-    with pytest.raises(TypeError, match="parameters must be AdaptiveParameters"):
-        jflnr.denoise(frame, "flr-adaptive", parameters=jflnr.Parameters.of(8, 1e-3, 1e-3))
+    with pytest.raises(TypeError, match="parameters must be AdaptiveFLR"):
+        jflnr.denoise(frame, "flr-adaptive", parameters=jflnr.FLR(8, 1e-3, 1e-3))
 
 
 def test_a_slit_into_the_open_is_no_bright_streak(rng):

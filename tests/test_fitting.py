@@ -6,11 +6,11 @@ import pytest
 
 import jflnr
 from jflnr.fitting import fit
-from jflnr.flnr.loss import shown_error
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import Parameters
 from jflnr.frame import Frame
 from jflnr.metrics import exposure
+from jflnr.network.loss import shown_error
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.flr import FLR
 
 HEIGHT, WIDTH = 48, 64
 X = np.mgrid[:HEIGHT, :WIDTH][1].astype(np.float32) / WIDTH
@@ -43,7 +43,7 @@ def shown(frame: Frame, light: np.ndarray) -> float:
 
 
 def test_adaptive_parameters_lower_the_error_of_what_is_shown(frame: Frame) -> None:
-    start = ADAPTIVE_DEFAULT.but(sigma=0.7)
+    start = AdaptiveFLR(sigma=0.7)
     found = fit([frame], "flr-adaptive", initial=start, steps=4)
     assert found.after < found.before - 0.1
     for parameters, error in ((start, found.before), (found.parameters, found.after)):
@@ -52,7 +52,7 @@ def test_adaptive_parameters_lower_the_error_of_what_is_shown(frame: Frame) -> N
 
 
 def test_parameters_of_flr_lower_smape(frame: Frame) -> None:
-    found = fit([frame], initial=Parameters.of(3, 1e-4, 1e-4), steps=4)
+    found = fit([frame], initial=FLR(3, 1e-4, 1e-4), steps=4)
     assert found.after < 0.9 * found.before and float(found.parameters.sigma) > 4
 
 

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 
 from experiments.peers.windows import box, over_offsets, square
-from jflnr.flr.solve import cholesky_solve
+from jflnr.regression.solve import cholesky_solve
 from jflnr.frame import Array, Frame
 from jflnr.guides import layers
 

@@ -12,8 +12,8 @@ import jflnr
 from experiments import data
 from experiments.stability.cases import room
 from experiments.stability.methods import SUPPORT
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 from jflnr.guides import choose, layers
 
 SIZE = 36, 44

@@ -13,12 +13,12 @@ import numpy as np
 
 from experiments.stability import solvers
 from experiments.stability.cases import Case, Type
-from jflnr.flnr.regression import flnr
-from jflnr.flnr.weights import shipped
-from jflnr.flr.adaptive import flr_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.network.flnr import flnr
+from jflnr.network.weights import shipped
+from jflnr.regression.adaptive import flr_adaptive
+from jflnr.regression.adaptive_parameters import ADAPTIVE_DEFAULT
+from jflnr.regression.parameters import DEFAULT
+from jflnr.regression.flr import flr
 from jflnr.temporal import bmfr_fit
 
 BLOCK = 8
@@ -130,7 +130,7 @@ def by_bmfr(case: Case, dtype: Type) -> np.ndarray:
 
 def by_opencl(case: Case, dtype: Type) -> np.ndarray:
     """The OpenCL kernels, which compute in float32 and read float32 or half."""
-    from jflnr.opencl.regression import flr as on_device
+    from jflnr.opencl.flr import flr as on_device
 
     return on_device(
         case.target, case.guides, DEFAULT, block=BLOCK, support=SUPPORT, weight=case.usable

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jflnr.flr.parameters import DEFAULT
+from jflnr.regression.parameters import DEFAULT
 
 TIKHONOV = 1e-6
 NOISE = 0.01  # amplitude of BMFR's stochastic regularisation, of guides scaled to [-1, 1]

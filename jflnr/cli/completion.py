@@ -21,14 +21,11 @@ def run(arguments: argparse.Namespace) -> int:
     import shtab
 
     from jflnr.cli import parser
-    from jflnr.denoising import BACKENDS, METHODS
 
     whole = parser()
     for action in _actions(whole):
         if action.type is Path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-        if action.dest in ("method", "backend"):
-            action.choices = METHODS if action.dest == "method" else BACKENDS
     print(shtab.complete(whole, arguments.shell))
     return 0
 

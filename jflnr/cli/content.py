@@ -42,26 +42,19 @@ def picture_of(frame: "Frame", lights: dict[str, np.ndarray]) -> np.ndarray:
 
 def about_of(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[str, Any]:
     """What was done, for the record and for the header of the output."""
-    model = settings.get("parameters")
-    names = ("sigma", "eps", "eps_prime") if settings["method"] == "flr" else ()
+    from jflnr.images.guides import choose
+
+    method = settings["method"]
+    own = getattr(method, "features", None)
+    names = ("sigma", "eps", "eps_prime") if method.name == "flr" else ()
     return {
-        "method": settings["method"],
+        "method": method.name,
         "backend": settings["backend"],
         "spp": spp,
-        **_model_of(frame, settings),
-        **{name: float(getattr(model, name)) for name in names},
+        "guides": list(own or choose(frame, settings["guides"])),
+        **({"block": method.block} if hasattr(method, "block") else {}),
+        **{name: float(getattr(method, name)) for name in names},
     }
-
-
-def _model_of(frame: "Frame", settings: dict[str, Any]) -> dict[str, Any]:
-    """What the models are made of, and the side of the squares that share one."""
-    if settings["method"] == "bmfr":
-        from jflnr.temporal.bmfr import PAPER
-
-        return {"guides": ["normal", "position"], "block": PAPER.block}
-    from jflnr.guides import choose
-
-    return {"guides": list(choose(frame, settings["guides"])), "block": settings["block"]}
 
 
 def not_finite_pixels(frame: "Frame") -> list[str]:

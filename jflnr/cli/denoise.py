@@ -21,11 +21,12 @@ from pathlib import Path
 from jflnr import layouts
 from jflnr.cli import shots
 from jflnr.cli.common import add_map, guide_names, to_json, voices
-from jflnr.cli.frames import Denoiser, Record, failure
+from jflnr.cli.frames import Record, Worker, failure
 from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import remarks, summary, throughput
+from jflnr.methods import BACKENDS, DEFAULT, METHODS
 
 EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
@@ -45,15 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
     add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
-    add(
-        "--method", default="flr", help="flr, flr-adaptive, flnr[-small, -tiny], bmfr or auto (flr)"
-    )
+    listed = ", ".join(METHODS)
+    add("--method", default=DEFAULT, choices=METHODS, metavar="M", help=f"{listed} ({DEFAULT})")
     add(
         "--explain",
         action="store_true",
         help="with --method auto: print what it chose and why, and write a map, OUT.plan.png",
     )
-    add("--backend", default="jax", help="what runs it: jax or opencl (jax)")
+    add("--backend", default="jax", choices=BACKENDS, help="what runs it (jax)")
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--params", type=Path, metavar="FILE", help="what `jflnr fit` or `train` wrote")
     add("--sigma", type=float, help="standard deviation of the window, pixels")
@@ -112,7 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
     bound = memory.parse(arguments.memory) if arguments.memory else None
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()
-    denoiser = Denoiser(settings_of(arguments), arguments, bound, min(len(jobs), 3))
+    worker = Worker(settings_of(arguments), arguments, bound, min(len(jobs), 3))
     records, start = [], time.perf_counter()
     with (
         voices() as (out, err),
@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
             total=len(jobs), unit="frame", disable=arguments.quiet or None, leave=False, file=err
         ) as bar,
     ):
-        for record in _records(denoiser, jobs, arguments):
+        for record in _records(worker, jobs, arguments):
             records.append(record)
             bar.update()
             for line in remarks(record, arguments.quiet):
@@ -129,24 +129,22 @@ def run(arguments: argparse.Namespace) -> int:
                 bar.write(summary(record, arguments.verbose), file=out)
         if arguments.verbose and arguments.cluster is None:
             seconds = time.perf_counter() - start
-            bar.write(throughput(records, denoiser.exr_seconds, seconds), file=err)
+            bar.write(throughput(records, worker.exr_seconds, seconds), file=err)
     if arguments.json:
         print(to_json(records))
     return 2 if any("error" in record for record in records) else 0
 
 
-def _records(
-    denoiser: Denoiser, jobs: list[Job], arguments: argparse.Namespace
-) -> Iterator[Record]:
+def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:
     """What becomes of the frames, in the order in which they are finished."""
     from jflnr import cluster
 
     if arguments.cluster is not None:
         # Workers on this machine share its memory.
         at_once = 1 if arguments.cluster else cluster.cores()
-        denoiser = dataclasses.replace(denoiser, at_once=at_once, compiled=None)
+        worker = dataclasses.replace(worker, at_once=at_once, compiled=None)
     if shots.wanted(arguments):
-        return shots.records(denoiser, jobs, arguments)
+        return shots.records(worker, jobs, arguments)
     if arguments.cluster is None:
-        return pipelined(jobs, denoiser.read, denoiser.denoise, denoiser.write)
-    return cluster.each(arguments.cluster, denoiser, jobs, failure)
+        return pipelined(jobs, worker.read, worker.denoise, worker.write)
+    return cluster.each(arguments.cluster, worker, jobs, failure)

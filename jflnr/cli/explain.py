@@ -10,8 +10,8 @@ from PIL import Image
 from jflnr.files import replacing
 
 if TYPE_CHECKING:
+    from jflnr.auto.plan import Plan
     from jflnr.frame import Frame
-    from jflnr.selection.plan import Plan
 
 # From a constant to the model with all guides; also told apart without colour, by brightness.
 COLOURS = np.array([[20, 20, 60], [40, 100, 150], [70, 170, 130], [250, 230, 90]])
@@ -19,7 +19,7 @@ COLOURS = np.array([[20, 20, 60], [40, 100, 150], [70, 170, 130], [250, 230, 90]
 
 def explain(path: Path, frame: "Frame", guides: Sequence[str] | None) -> list[str]:
     """Lines for a person; writes the map to `path`, a PNG."""
-    from jflnr.selection.method import plan_of
+    from jflnr.auto.method import plan_of
 
     plan = plan_of(frame, guides)
     write_map(path, plan, frame.depth.shape[:2])

@@ -27,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("frames", metavar="FRAME", nargs="+", type=Path, help="EXR frames, or folders of them")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="JSON file to write")
-    add("--method", default="flr", help="flr, by SMAPE, or flr-adaptive, by PSNR and SMAPE (flr)")
+    help = "flr, by SMAPE, or flr-adaptive, by PSNR and SMAPE (flr)"
+    add("--method", default="flr", choices=("flr", "flr-adaptive"), help=help)
     add(
         "--spp",
         type=int,
@@ -44,13 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr import checks
-    from jflnr.denoising import BLOCK
-    from jflnr.fitting import METHODS, fit
-    from jflnr.flr.parameters import numbers_of, save_parameters
-    from jflnr.guides import choose
+    from jflnr.fitting import fit
+    from jflnr.images.guides import choose
+    from jflnr.methods import method_of
+    from jflnr.parameters import numbers_of, save_parameters
 
-    checks.choice("--method", arguments.method, METHODS)
     files = expand(arguments.frames)
     check_apart([arguments.output], files)
     if arguments.output.exists() and not arguments.overwrite:
@@ -58,29 +57,30 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     frames = [_read(file, spp) for file in files for spp in arguments.spp]
     guides = choose(frames[0], arguments.guides)
-    block = BLOCK if arguments.block is None else arguments.block
+    method = method_of(arguments.method)
+    if arguments.block is not None:
+        method = method_of(method, block=arguments.block)
     make_folder(arguments.output)
     print(f"frames: {len(frames)}, guides: {', '.join(guides) or 'none'}", flush=True)
     error = "SMAPE" if arguments.method == "flr" else "error"
     result = fit(
         frames,
-        arguments.method,
+        method,
         guides=guides,
-        block=block,
         steps=arguments.steps,
         progress=lambda step, loss: print(f"step {step}: {error} {loss:.5f}", flush=True),
     )
     save_parameters(
         arguments.output,
-        result.parameters,
+        result.method,
         guides=list(guides),
-        **({"block": block} if arguments.method == "flr" else {}),
+        block=method.block,
         spp=arguments.spp,
         frames=len(frames),
         before=result.before,
         after=result.after,
     )
-    numbers = ", ".join(f"{name} {n:.4g}" for name, n in numbers_of(result.parameters).items())
+    numbers = ", ".join(f"{name} {n:.4g}" for name, n in numbers_of(result.method).items())
     print(
         f"{error} {result.before:.5f} before, {result.after:.5f} after, steps: {result.steps}\n"
         f"{numbers} -> {arguments.output}"

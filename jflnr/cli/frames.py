@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+import functools
 import json
 import time
 import warnings
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+import jflnr
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, sentence
 from jflnr.cli.content import (
@@ -56,13 +58,13 @@ class Denoised(NamedTuple):
 
 
 @dataclass
-class Denoiser:
+class Worker:
     """Denoises files. Calling it does all of a frame's stages; threads may share them.
 
     A stage returns a record where nothing is left to do: the frame is there, has failed or is
     written; later stages pass that on.
 
-    settings: keyword arguments of `jflnr.denoise`. arguments: of the command line. memory: bytes
+    settings: keyword arguments of `jflnr.Denoiser`. arguments: of the command line. memory: bytes
     that frames may take, None for a share of what is free. at_once: how many may be in memory.
     compiled: shapes of the frames that there are programs for, None if nobody asks.
     """
@@ -73,6 +75,11 @@ class Denoiser:
     at_once: int = 1
     compiled: set[tuple] | None = field(default_factory=set)
     exr_seconds: dict[str, float] = field(default_factory=lambda: {"read": 0.0, "write": 0.0})
+
+    @functools.cached_property
+    def denoiser(self) -> "jflnr.Denoiser":
+        """What denoises; made where it is used, since it does not travel to another process."""
+        return jflnr.Denoiser(**self.settings)
 
     def __call__(self, job: Job) -> Record:
         return self.write(self.denoise(self.read(job)))
@@ -96,7 +103,7 @@ class Denoiser:
     def denoise(
         self, loaded: Loaded | Record, light: Callable[["Frame"], Light] | None = None
     ) -> Denoised | Record:
-        """light: what denoises instead of `jflnr.denoise`; it may be called twice."""
+        """light: what denoises instead of the denoiser; it may be called twice."""
         if isinstance(loaded, dict):
             return loaded
         return self._reported(loaded.job, lambda: self._denoise(loaded, light or self._light))
@@ -139,7 +146,7 @@ class Denoiser:
             from jflnr.cli.strips import denoise_in_strips
 
             assert tile is not None
-            return _record(job) | denoise_in_strips(job, settings, arguments, tile)
+            return _record(job) | denoise_in_strips(job, self.denoiser, arguments, tile)
         noisy = with_direct(frame, job.source) if arguments.direct else frame
         if arguments.reference and frame.reference is None:
             raise ValueError(
@@ -189,13 +196,9 @@ class Denoiser:
         return Denoised(job, source, frame, lights, light_error, about, record)
 
     def _light(self, frame: "Frame") -> Light:
-        from jflnr.denoising import denoise
-        from jflnr.uncertainty import denoise_with_error
-
-        if not self.arguments.error_map:
-            return np.asarray(denoise(frame, **self.settings), np.float32), None
-        light, error = denoise_with_error(frame, guides=self.settings["guides"])
-        return np.asarray(light), np.asarray(error)
+        given = self.denoiser(frame)
+        light, error = given if isinstance(given, tuple) else (given, None)
+        return np.asarray(light, np.float32), error
 
     def _write(self, done: Denoised) -> Record:
         start = time.perf_counter()

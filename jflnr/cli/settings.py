@@ -1,76 +1,54 @@
-"""From the options of `jflnr denoise` to the keyword arguments of `jflnr.denoise`."""
+"""From the options of `jflnr denoise` to the keyword arguments of `jflnr.Denoiser`."""
 
 import argparse
 from typing import Any
 
 
 def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Keyword arguments of `jflnr.denoise`: the options, over the file's, over the defaults."""
-    from jflnr import checks
-    from jflnr.denoising import BACKENDS, BLOCK, METHODS
-    from jflnr.flr import parameters
+    """Method, backend and guides: the options, over the file's, over the defaults."""
+    from jflnr.methods import method_of
 
-    checks.choice("--method", arguments.method, METHODS)
-    checks.choice("--backend", arguments.backend, BACKENDS)
+    name = arguments.method
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
-    if arguments.explain and arguments.method != "auto":
+    if arguments.explain and name != "auto":
         raise ValueError("--explain tells what --method auto chose, so it needs that method")
-    if arguments.method != "flr":
-        return _settings_of_another(arguments)
-    model, about = parameters.DEFAULT, dict[str, Any]()
+    given = {n: getattr(arguments, n) for n in ("sigma", "eps", "eps_prime", "block")}
+    options = {n: value for n, value in given.items() if value is not None}
+    if name != "flr" and (odd := options.keys() - {"block"}):
+        option = min(odd).replace("_", "-")
+        raise ValueError(f"--{option} is for --method flr; {name} finds its own")
+    method, about = method_of(name), dict[str, Any]()
     if arguments.params:
-        model, about = _load(arguments)
-    values = {}
-    for name in ("sigma", "eps", "eps_prime"):
-        given = getattr(arguments, name)
-        values[name] = float(getattr(model, name)) if given is None else given
+        method, about = _load(arguments, method)
+        options = {n: about[n] for n in ("block",) if n in about} | options
+    if arguments.error_map:
+        options["with_error"] = True
     return {
-        "method": arguments.method,
+        "method": method_of(method, **options),
         "backend": arguments.backend,
-        "parameters": parameters.Parameters.of(**values),
         "guides": _guides(about) if arguments.guides is None else arguments.guides,
-        "block": about.get("block", BLOCK) if arguments.block is None else arguments.block,
     }
 
 
-def _settings_of_another(arguments: argparse.Namespace) -> dict[str, Any]:
-    """As `settings_of`, for methods that have no sigma, eps and eps' to set."""
-    from jflnr.denoising import BLOCK
-    from jflnr.flnr import METHODS, weights
+def _load(arguments: argparse.Namespace, method: Any) -> tuple[Any, dict[str, Any]]:
+    """The method with what `--params` names, and the rest of the file."""
+    from jflnr.methods import method_of
+    from jflnr.parameters import METHODS, load_parameters
 
-    learned = arguments.method in ("flr-adaptive", *METHODS)
-    for name in ("sigma", "eps", "eps_prime", *(() if learned else ("params",))):
-        if getattr(arguments, name) is not None:
-            option = name.replace("_", "-")
-            raise ValueError(f"--{option} is for --method flr; {arguments.method} finds its own")
-    if arguments.method == "bmfr" and arguments.guides is not None:
-        raise ValueError("--guides is not for --method bmfr, whose features are the paper's")
-    own, about = None, dict[str, Any]()
-    if arguments.params is not None and arguments.method in METHODS:
-        own = weights.load(arguments.params)[0]
-    elif arguments.params is not None:
-        own, about = _load(arguments)
-    return {
-        "method": arguments.method,
-        "backend": arguments.backend,
-        "parameters": own,
-        "guides": _guides(about) if arguments.guides is None else arguments.guides,
-        "block": BLOCK if arguments.block is None else arguments.block,
-    }
+    if hasattr(method, "params"):
+        from jflnr.network import weights
 
-
-def _load(arguments: argparse.Namespace) -> tuple[Any, dict[str, Any]]:
-    """The parameters that `--params` names, which must be the method's."""
-    from jflnr.flr.parameters import load_parameters, method_of
-
-    model, about = load_parameters(arguments.params)
-    if (fitted := method_of(model)) != arguments.method:
+        return method_of(method, params=weights.load(arguments.params)[0]), {}
+    if method.name not in METHODS:
+        raise ValueError(f"--params is not for --method {method.name}, which finds its own")
+    fitted, about = load_parameters(arguments.params)
+    if fitted.name != method.name:
         raise ValueError(
-            f"{arguments.params} holds parameters of method {fitted}, and --method is "
-            f"{arguments.method}; `jflnr fit --method {arguments.method}` makes what is needed"
+            f"{arguments.params} holds parameters of method {fitted.name}, and --method is "
+            f"{method.name}; `jflnr fit --method {method.name}` makes what is needed"
         )
-    return model, about
+    return fitted, about
 
 
 def _guides(about: dict[str, Any]) -> list[str] | None:

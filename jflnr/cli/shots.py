@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import functools
-import importlib
 import itertools
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jflnr import checks
-from jflnr.cli.frames import Denoised, Denoiser, Light, Loaded, Record, failure
+from jflnr.cli.frames import Denoised, Light, Loaded, Record, Worker, failure
 from jflnr.cli.jobs import Job, natural
 from jflnr.cli.pipeline import pipelined
 
@@ -29,7 +26,9 @@ if TYPE_CHECKING:
     from jflnr.history import History
 
 # What a history depends on.
-OPTIONS = ("method", "spp", "map", "direct", "guides", "params", "sigma", "eps", "eps_prime")
+OPTIONS = (
+    "method", "spp", "map", "direct", "guides", "params", "sigma", "eps", "eps_prime", "block"
+)  # fmt: skip
 
 UNKNOWN_MOTION = "Without a layer motion and a camera, everything is taken to stand still."
 
@@ -38,20 +37,17 @@ def wanted(arguments: argparse.Namespace) -> bool:
     """Whether frames are to be denoised as shots. Raises ValueError if something excludes that."""
     if not (arguments.temporal or arguments.history is not None or arguments.method == "bmfr"):
         return False
-    for name, alone in (("error_map", False), ("profile", False), ("block", None)):
-        if getattr(arguments, name) != alone:
+    for name in ("error_map", "profile"):
+        if getattr(arguments, name):
             raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
-    from jflnr.temporal.sequence import METHODS
-
-    checks.choice("--method, of a shot,", arguments.method, (*METHODS, "bmfr"))
+    if arguments.method == "auto":
+        raise ValueError("--method auto is for frames by themselves, not shots")
     if arguments.backend != "jax" and arguments.history is not None:
         raise ValueError("--history keeps what the jax backend remembers: leave out --backend")
     return True
 
 
-def records(
-    denoiser: Denoiser, jobs: Sequence[Job], arguments: argparse.Namespace
-) -> Iterator[Record]:
+def records(worker: Worker, jobs: Sequence[Job], arguments: argparse.Namespace) -> Iterator[Record]:
     """What becomes of the frames of all shots; on a cluster, a shot is what a worker is given."""
     shots = shots_of(jobs)
     if arguments.history is not None and len(shots) > 1:
@@ -59,7 +55,7 @@ def records(
             f"--history is of one shot, and the frames are of {len(shots)} folders: "
             "give one folder, or leave --history out"
         )
-    runner = ShotDenoiser(denoiser, arguments.history)
+    runner = ShotDenoiser(worker, arguments.history)
     if arguments.cluster is None:
         return itertools.chain.from_iterable(map(runner.records, shots))
     from jflnr import cluster
@@ -83,7 +79,7 @@ def shots_of(jobs: Iterable[Job]) -> list[list[Job]]:
 class ShotDenoiser:
     """Denoises shots, one after another. history: the file of `--history`."""
 
-    denoiser: Denoiser
+    worker: Worker
     history: Path | None = None
 
     def __call__(self, shot: Sequence[Job]) -> list[Record]:
@@ -92,7 +88,7 @@ class ShotDenoiser:
     def records(self, shot: Sequence[Job]) -> Iterator[Record]:
         """What becomes of each frame. Raises ValueError if the history is not that of this shot."""
         before = self._before()
-        kept = [self.denoiser.kept(job) for job in shot]
+        kept = [self.worker.kept(job) for job in shot]
         done = 0 if before is None else _frames_in(before, shot)
         if missing := [job for job, there in zip(shot[:done], kept, strict=False) if not there]:
             raise ValueError(
@@ -100,7 +96,7 @@ class ShotDenoiser:
                 "delete it, and the shot starts from its first frame"
             )
         last = max((i + 1 for i, there in enumerate(kept) if not there), default=done)
-        running = _Running(self.denoiser, self.history, before)
+        running = _Running(self.worker, self.history, before)
         yield from (record for record in kept[:done] if record)
         yield from pipelined(shot[done:last], running.read, running.denoise, running.write)
         yield from (record for record in kept[last:] if record)
@@ -112,7 +108,7 @@ class ShotDenoiser:
         if self.history is None or not self.history.exists():
             return None
         found = history.read(self.history)
-        for name, value in _options(self.denoiser.arguments).items():
+        for name, value in _options(self.worker.arguments).items():
             if (other := found.about["options"].get(name)) != value:
                 raise ValueError(
                     f"{self.history} was made with --{name.replace('_', '-')} {other}, and this is "
@@ -126,7 +122,7 @@ class _Running:
     """A shot on its way. state: after the last frame that was denoised; header: that of the last
     frame that was read."""
 
-    denoiser: Denoiser
+    worker: Worker
     history: Path | None
     before: History | None
     state: Any = None
@@ -139,7 +135,7 @@ class _Running:
 
     def read(self, job: Job) -> Loaded | Record:
         """The frame, with motion from the cameras if it has none of its own."""
-        loaded = self.denoiser.load(job)
+        loaded = self.worker.load(job)
         if isinstance(loaded, dict):
             return loaded
         if loaded.source is None or loaded.frame is None:
@@ -158,22 +154,21 @@ class _Running:
             after, image = self._step(frame)
             return image, None
 
-        denoised = self.denoiser.denoise(loaded, light)
+        denoised = self.worker.denoise(loaded, light)
         if isinstance(denoised, Denoised):
             self.state = after
         return denoised, self.state
 
     def _step(self, frame: Frame) -> tuple[Any, np.ndarray]:
-        start, step = _functions(self.denoiser.settings)
-        if self.state is not None:
-            state = self.state
-        else:
-            state = start(frame) if self.before is None else self.before.state(start(frame))
+        denoiser = self.worker.denoiser
+        denoiser.state = self.state
+        if self.state is None and self.before is not None:
+            denoiser.state = self.before.state(denoiser.start(frame))
         if frame.motion is None:
             warnings.warn(UNKNOWN_MOTION, stacklevel=1)
             frame = dataclasses.replace(frame, motion=np.zeros((*frame.depth.shape[:2], 2)))
-        state, image = step(state, frame)
-        return state, np.asarray(image, np.float32)
+        image = denoiser.next(frame)
+        return denoiser.state, np.asarray(image, np.float32)
 
     def write(self, done: tuple[Denoised | Record, Any]) -> Record:
         """Write the frame, unless it is there, then the history, so that it is never ahead."""
@@ -183,29 +178,17 @@ class _Running:
         if isinstance(denoised, dict):
             self.failed = True  # from here on the history would hide that a frame is missing
             return denoised
-        record = self.denoiser.kept(denoised.job) or self.denoiser.write(denoised)
+        record = self.worker.kept(denoised.job) or self.worker.write(denoised)
         self.failed = self.failed or "error" in record
         if self.history is not None and not self.failed:
             source = denoised.source
             about = {
-                "options": _options(self.denoiser.arguments),
+                "options": _options(self.worker.arguments),
                 "last": _identity(source.path),
                 "header": source.header,
             }
             history.write(self.history, state, about)
         return record
-
-
-def _functions(settings: dict[str, Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """What makes the first state, and what denoises the next frame."""
-    on_device, options = settings["backend"] == "opencl", dict[str, Any]()
-    if settings["method"] == "bmfr":
-        name = "jflnr.opencl.bmfr" if on_device else "jflnr.temporal.bmfr"
-    else:
-        name = "jflnr.opencl.temporal" if on_device else "jflnr.temporal"
-        options = {key: settings[key] for key in ("method", "guides", "parameters")}
-    module = importlib.import_module(name)
-    return module.start, functools.partial(module.step, **options)
 
 
 def _options(arguments: argparse.Namespace) -> dict[str, str]:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+import jflnr
 from jflnr import exr, layouts
 from jflnr.cli.content import about_of, picture_of, split, spp_of, with_direct
 from jflnr.cli.jobs import Job
 from jflnr.frame import Frame, frame_of
-from jflnr.large import strips
 from jflnr.large.scanlines import Scanlines
 from jflnr.large.source import Rows
 
@@ -23,24 +23,25 @@ ALWAYS = {"indirect", "normal", "depth", "mask"}
 
 
 def denoise_in_strips(
-    job: Job, settings: dict[str, Any], arguments: argparse.Namespace, tile: int
+    job: Job, denoiser: "jflnr.Denoiser", arguments: argparse.Namespace, tile: int
 ) -> dict[str, Any]:
     """Read, denoise and write a frame piece by piece; the record of it."""
     _check(arguments)
     start = time.perf_counter()
     file = Scanlines(job.source, arguments.spp, dict(arguments.map))
     first = file.part(0, 1, layouts.LAYERS)
+    settings = {"method": denoiser.method, "backend": denoiser.backend, "guides": denoiser.guides}
     about = about_of(frame_of(first), settings, spp_of(first, arguments))
     comments = json.dumps(first.header | {"denoiser": about})
-    options = strips.options(settings, tuple(about["guides"]))
     size, window = (file.height, file.width), file.attributes.window
     others = file.attributes.others
     with contextlib.ExitStack() as stack:
-        append = None
-        for top, light in strips.denoise(
-            _rows(file, options.names, arguments), options, tile, job.target.parent
-        ):
-            channels = _channels(file, top, light, arguments)
+        append, names = None, tuple(about["guides"])
+        rows = _rows(file, names, arguments)
+        for top, given in denoiser.strips(rows, names, tile, job.target.parent):
+            channels = _channels(file, top, given["image"], arguments)
+            if "error" in given:
+                channels["error.Y"] = given["error"][..., 0]
             if append is None:
                 types = dict.fromkeys(channels, np.float32)
                 output = exr.writing_rows(job.target, size, types, comments, window, others)
@@ -60,11 +61,9 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile", "error-map", "explain"):
-        if getattr(arguments, option.replace("-", "_")):
+    for option in ("png", "reference", "profile"):
+        if getattr(arguments, option):
             raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
-    if arguments.method == "auto":
-        raise ValueError("--method auto needs the whole frame in memory: raise --memory")
     if arguments.channels == "all":
         raise ValueError("--channels all needs the whole frame in memory: raise --memory")
 
@@ -80,7 +79,7 @@ def _rows(file: Scanlines, names: tuple[str, ...], arguments: argparse.Namespace
         both = with_direct(rows.read(start, stop), file.path)
         return dataclasses.replace(both, direct=None)
 
-    return dataclasses.replace(rows, read=read, channels=6)
+    return dataclasses.replace(rows, read=read)
 
 
 def _channels(

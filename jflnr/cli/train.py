@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
-    from jflnr.flnr.train import Progress, Result, Settings
+    from jflnr.network.train import Progress, Result, Settings
 
 UNITS = {"s": 1, "m": 60, "h": 3600}
 
@@ -53,8 +53,8 @@ def seconds(text: str) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     from jflnr import checks
-    from jflnr.flnr import examples, weights
-    from jflnr.flnr.train import CONFIGS, Settings, train
+    from jflnr.network import examples, weights
+    from jflnr.network.train import CONFIGS, Settings, train
 
     checks.choice("--config", arguments.config, tuple(CONFIGS))
     for name in ("batch", "every"):
@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _read(paths: Sequence[Path], seed: int) -> list:
     from tqdm import tqdm
 
-    from jflnr.flnr import examples
+    from jflnr.network import examples
 
     found = []
     for some in tqdm(examples.read(paths, seed), "reading", len(paths), leave=False, disable=None):
@@ -141,7 +141,7 @@ class _Clock:
 def _write(
     output: Path, result: "Result", settings: "Settings", paths: Sequence[Path], count: int
 ) -> None:
-    from jflnr.flnr import examples, weights
+    from jflnr.network import examples, weights
 
     weights.save(
         output,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import re
+from typing import Any
 
 import psutil
 
@@ -17,9 +18,6 @@ BASE = 450 * 2**20
 WHOLE = 320
 REST = {"flr": 1, "flr-adaptive": 1, "flnr": 17}
 PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 230}
-# Rows that strips of `flr` overlap by, and pixels that tiles of `flr-adaptive` and `flnr` do.
-STRIP_OVERLAP = 200
-TILE_OVERLAP = {"flr-adaptive": 1664, "flnr": 2048}
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
 # The name that glibc's <malloc.h> gives what `keep_freed` sets, and bytes that are kept.
@@ -49,9 +47,7 @@ def keep_freed() -> None:
         ctypes.CDLL("libc.so.6").mallopt(TRIM_THRESHOLD, KEPT)
 
 
-def tile_for(
-    height: int, width: int, memory: int, at_once: int = 1, method: str = "flr"
-) -> int | None:
+def tile_for(height: int, width: int, memory: int, at_once: int, method: Any) -> int | None:
     """The side of the pieces for a frame of this size, or None if it may be denoised whole.
 
     memory: bytes that may be taken. at_once: how many whole frames are in memory together.
@@ -60,31 +56,16 @@ def tile_for(
     pixels = height * width
     if BASE + at_once * WHOLE * pixels <= memory:
         return None
-    side = 0.0
-    kind = _kind(method)
-    area = (memory - BASE - REST[kind] * pixels) / PIECE[kind]
-    if kind == "flr":
-        side = max(area - STRIP_OVERLAP * width, 0) ** 0.5
-    elif area > 0:
-        side = area**0.5 - TILE_OVERLAP[kind]
+    if not hasattr(method, "stages"):
+        raise ValueError(f"method {method.name} needs the whole frame in memory: raise --memory")
+    kind = method.name if method.name in PIECE else "flnr"
+    overlap = 2 * max(stage.reach for stage in method.stages())
+    fixed = BASE + REST[kind] * pixels
+    side = max((memory - fixed) / PIECE[kind], 0) ** 0.5 - overlap
     if side < SMALLEST:
+        least = fixed + PIECE[kind] * (SMALLEST + overlap) ** 2
         raise ValueError(
             f"--memory: {memory / 2**20:.0f}M are too little for {width} x {height} pixels with "
-            f"{method}; about {_least(pixels, width, method) / 2**20:.0f}M are needed"
+            f"{method.name}; about {least / 2**20:.0f}M are needed"
         )
     return int(side) // 32 * 32
-
-
-def _least(pixels: int, width: int, method: str) -> int:
-    """Bytes that the smallest pieces take."""
-    kind = _kind(method)
-    if kind == "flr":
-        area = SMALLEST**2 + STRIP_OVERLAP * width
-    else:
-        area = (SMALLEST + TILE_OVERLAP[kind]) ** 2
-    return BASE + REST[kind] * pixels + PIECE[kind] * area
-
-
-def _kind(method: str) -> str:
-    """The method whose memory this one's is like."""
-    return method if method in PIECE else "flnr"

@@ -3,8 +3,8 @@
 from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
 from jflnr.opencl.devices import NoDevice, all_devices
-from jflnr.opencl.network import flnr
+from jflnr.opencl.flnr import flnr
+from jflnr.opencl.flr import flr
 from jflnr.opencl.noisy_guides import smooth_guide
-from jflnr.opencl.regression import flr
 
 __all__ = ["Context", "NoDevice", "all_devices", "flnr", "flr", "flr_adaptive", "smooth_guide"]

@@ -1,7 +1,8 @@
-"""Adaptive FLR on an OpenCL device: the steps of jflnr/flr/adaptive.py (docs/adaptive.md)."""
+"""Adaptive FLR on OpenCL devices: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -9,10 +10,6 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from jflnr import checks
-from jflnr.flr.adaptive import BLOCK, LEVELS
-from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.arguments import channel_count, check_regression
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
 from jflnr.opencl.context import Context, default_context, is_device_array
@@ -24,10 +21,12 @@ from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.pyramid import halve, halve_planes
 from jflnr.opencl.weighted_moments import collect_weighted
+from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
+from jflnr.regression.arguments import channel_count, check_regression
 
 
 class Step(NamedTuple):
-    """One level finer than what was known before; see `jflnr.flr.widths.Step`.
+    """One level finer than what was known before; see `jflnr.regression.widths.Step`.
 
     fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
     coarser grid.
@@ -45,17 +44,15 @@ BRIGHT = 1e15
 def flr_adaptive(
     target: Any,
     guides: Any,
-    parameters: AdaptiveParameters,
+    method: AdaptiveFLR = DEFAULT,
     *,
-    block: int = BLOCK,
-    levels: int = LEVELS,
     weight: Any | None = None,
-    keep_energy: bool = False,
     context: Context | None = None,
     out: Any | None = None,
     on_device: bool = False,
+    **options: Any,
 ) -> Any:
-    """`jflnr.flr.adaptive.flr_adaptive` on an OpenCL device: same arguments, same result.
+    """`jflnr.flr_adaptive` on an OpenCL device: same arguments, same result.
 
     target, guides and weight may be arrays of numpy or JAX, or device arrays; context, out and
     on_device: as in `jflnr.opencl.flr`.
@@ -64,16 +61,18 @@ def flr_adaptive(
     Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
-    check_regression(target, guides, None, weight, block, 1)
-    checks.positive_integer("levels", levels)
+    method = dataclasses.replace(method, **options)
+    if method.with_error:
+        raise ValueError("the standard error is told on the jax backend only")
+    check_regression(target, guides, None, weight)
     check_counts(channel_count(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
     pixels, unit = in_unit(target)
     images = context.array(pixels), to_layers(context, guides)
     counts = to_weight(context, weight)
-    image = context.empty(target.shape) if keep_energy else output
-    _denoise(context, *images, counts, parameters, max(block // 2, 1), levels, image)
-    if keep_energy:
+    image = context.empty(target.shape) if method.keep_energy else output
+    _denoise(context, *images, counts, method, image)
+    if method.keep_energy:
         rescale(context, image, images[0], counts, output)
     if unit != 1:
         context.scale(output, unit)
@@ -102,26 +101,21 @@ def _denoise(
     target: Any,
     guides: tuple[Any, ...],
     weight: Any | None,
-    parameters: AdaptiveParameters,
-    block: int,
-    levels: int,
+    method: AdaptiveFLR,
     image: Any,
 ) -> None:
-    """The three passes over the pixels, and what happens on blocks between them; writes `image`.
-
-    block: side in pixels of the finest blocks.
-    """
+    """The three passes over the pixels, and what happens on blocks between them; writes `image`."""
+    block = method.finest
     count, channels, w = channel_count(guides), target.shape[2], -(-target.shape[1] // (2 * block))
     shift = centre(context, guides)
     moments = collect(context, target, guides, shift, 2 * block, weight, light=True)
     mean = frame_mean(context, moments, w, count)
-    numbers = jax.tree.map(lambda number: math.exp(float(number)), parameters)
-    run = Run(context, count, channels, numbers, shift, mean)
+    run = Run(context, count, channels, jax.tree.map(float, method), shift, mean)
     pilot = fit_pilot(run, moments, w, block)
     grid = collect_weighted(run, target, guides, pilot, weight, block)
-    _, merged = fit_levels(run, grid, block, levels)
+    _, merged = fit_levels(run, grid, block, method.levels)
     scale, own = restore(run, merged, moments, w), own_light(run, merged, grid)
-    restored = Restored(*scale, own, numbers.floor)
+    restored = Restored(*scale, own, run.numbers.floor)
     apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
 
 

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/apply.cl; its twin in JAX is jflnr/flr/apply.py."""
+"""Host side of kernels_cl/apply.cl; its twin in JAX is jflnr/regression/apply.py."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Restored(NamedTuple):
     rate: Any
     brightness: Any
     own: Grid
-    floor: float
+    floor: Any
 
 
 def apply(

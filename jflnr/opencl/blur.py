@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/blur.cl; its twin in JAX is jflnr/flr/blur.py."""
+"""Host side of kernels_cl/blur.cl; its twin in JAX is jflnr/regression/blur.py."""
 
 from __future__ import annotations
 

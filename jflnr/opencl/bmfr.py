@@ -1,4 +1,4 @@
-"""BMFR on an OpenCL device: host side of kernels_cl/bmfr/; its twin is jflnr/temporal/bmfr.py."""
+"""BMFR on an OpenCL device: host side of kernels_cl/bmfr/; its twin is jflnr/bmfr/pipeline.py."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
+from jflnr.bmfr import pipeline
+from jflnr.bmfr.pipeline import BMFR, DARK, PAPER, History
 from jflnr.frame import Frame
 from jflnr.opencl.arguments import to_output
 from jflnr.opencl.bmfr_fit import fit
 from jflnr.opencl.context import Context, default_context, is_device_array
-from jflnr.temporal import bmfr
-from jflnr.temporal.bmfr import DARK, PAPER, BmfrParameters, History
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 
 
 def start(frame: Frame, context: Context | None = None) -> History:
-    """`jflnr.temporal.bmfr.start`, on the device."""
+    """`jflnr.bmfr.pipeline.start`, on the device."""
     context = default_context() if context is None else context
     size = frame.normal.shape[:2]
     zeros = lambda channels: context.array(np.zeros((*size, channels), np.float32))
@@ -27,12 +27,12 @@ def start(frame: Frame, context: Context | None = None) -> History:
 def step(
     history: History,
     frame: Frame,
-    parameters: BmfrParameters = PAPER,
+    method: BMFR = PAPER,
     *,
     context: Context | None = None,
     on_device: bool = False,
 ) -> tuple[History, Any]:
-    """`jflnr.temporal.bmfr.step` on an OpenCL device: same arguments, same result.
+    """`jflnr.bmfr.pipeline.step` on an OpenCL device: same arguments, same result.
 
     history: from `start` or the frame before, its arrays on the device. The layers of the frame,
     of numpy, JAX or on the device, are read again in the next step and must not change before.
@@ -41,24 +41,24 @@ def step(
     Raises `ValueError` for a layer of the wrong shape; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
-    bmfr.check(frame)
+    pipeline.check(frame)
     height, width = frame.indirect.shape[:2]
     output, result = to_output(context, (height, width, 3), None, on_device)
     layers = {
         "sample": frame.indirect,
-        "motion": bmfr.motion(frame),
+        "motion": pipeline.motion(frame),
         "normal": frame.normal,
         "depth": frame.depth,
-        "position": bmfr.position(frame),
+        "position": pipeline.position(frame),
         "surface": frame.depth if frame.mask is None else frame.mask,
         "albedo": frame.albedo,
     }
     layers = {name: to_device(context, layer) for name, layer in layers.items()}
     depths = frame.position is None
-    light, count, accepted = accumulate_light(context, history, layers, parameters, depths)
-    fitted = fit(context, light, count, layers, history.number, parameters.block, parameters.noise)
-    mean, picture = accumulate_fitted(context, history, layers, parameters, fitted, count, accepted)
-    smooth = taa(context, history, layers, parameters, picture, mean, output)
+    light, count, accepted = accumulate_light(context, history, layers, method, depths)
+    fitted = fit(context, light, count, layers, history.number, method.block, method.noise)
+    mean, picture = accumulate_fitted(context, history, layers, method, fitted, count, accepted)
+    smooth = taa(context, history, layers, method, picture, mean, output)
     surface = Surface(layers["normal"], layers["depth"], layers["position"])
     following = History(history.number + 1, surface, count, light, mean, smooth)
     return following, context.finish(output, result)
@@ -75,10 +75,10 @@ def accumulate_light(
     context: Context,
     history: History,
     layers: dict[str, Any],
-    parameters: BmfrParameters,
+    method: BMFR,
     depths: bool,
 ) -> tuple[Any, Any, Any]:
-    """Phase I: mean of the samples at each place; see `jflnr.temporal.bmfr.accumulate_light`.
+    """Phase I: mean of the samples at each place; see `jflnr.bmfr.pipeline.accumulate_light`.
 
     depths: tell surfaces apart by depth. Returns the mean `(H, W, 3)`, the number of samples
     `(H, W, 1)`, and a bit for every accepted tap, `(H, W)`.
@@ -88,11 +88,11 @@ def accumulate_light(
     accepted = context.empty((height, width), np.uint8)
     before = history.surface
     arguments = (
-        OFF_PLANE, SAME_NORMAL, parameters.light_share, layers["sample"], layers["surface"],
+        OFF_PLANE, SAME_NORMAL, method.light_share, layers["sample"], layers["surface"],
         layers["motion"], layers["normal"], layers["depth"], layers["position"], before.normal,
         before.depth, before.position, history.samples, history.light, light, count, accepted,
     )  # fmt: skip
-    defines = {"MOST": bmfr.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
+    defines = {"MOST": pipeline.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
     run_on_rows(context, "accumulate_light", (width, height), arguments, defines)
     return light, count, accepted
 
@@ -101,7 +101,7 @@ def accumulate_fitted(
     context: Context,
     history: History,
     layers: dict[str, Any],
-    parameters: BmfrParameters,
+    method: BMFR,
     fitted: Any,
     count: Any,
     accepted: Any,
@@ -110,7 +110,7 @@ def accumulate_fitted(
     height, width = fitted.shape[:2]
     mean, picture = context.empty(fitted.shape), context.empty((3, height, width))
     arguments = (
-        parameters.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
+        method.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
         history.fitted, mean, picture,
     )  # fmt: skip
     run_on_rows(context, "accumulate_fitted", (width, height), arguments)
@@ -121,7 +121,7 @@ def taa(
     context: Context,
     history: History,
     layers: dict[str, Any],
-    parameters: BmfrParameters,
+    method: BMFR,
     picture: Any,
     mean: Any,
     image: Any,
@@ -130,7 +130,7 @@ def taa(
     height, width = mean.shape[:2]
     smooth = context.empty(mean.shape)
     arguments = (
-        parameters.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
+        method.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
         layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
     run_on_rows(context, "taa", (width, height), arguments)

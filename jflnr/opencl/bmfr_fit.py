@@ -1,12 +1,12 @@
-"""Host side of kernels_cl/bmfr/fit.cl and weighted_sum.cl; the twin is temporal/bmfr_fit.py."""
+"""Host side of kernels_cl/bmfr/fit.cl and weighted_sum.cl; the twin is bmfr/fit.py."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from jflnr.bmfr.fit import FLAT, grid_offset
 from jflnr.opencl.context import Context
 from jflnr.opencl.moments import guide_arguments, guide_defines
-from jflnr.temporal.bmfr_fit import FLAT, grid_offset
 
 CHANNELS = 3
 # Of the matrix [T, z]: 1, six features, three squares and the light.
@@ -21,9 +21,9 @@ def fit(
     layers: dict[str, Any],
     number: Any,
     block: int,
-    noise: float,
+    noise: Any,
 ) -> Any:
-    """Phase II: `jflnr.temporal.bmfr_fit.fit` of normal and position with its squares, not below 0.
+    """Phase II: `jflnr.bmfr.fit.fit` of normal and position with its squares, not below 0.
 
     light: `(H, W, 3)`. count: `(H, W, 1)`, samples in it. layers: normal and position, `(H, W, 3)`,
     and surface, `(H, W, 1)`, above 0 where there is one. All are device arrays. The rest as there.

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/energy.cl and rescale.cl; its twin in JAX is jflnr/flr/energy.py."""
+"""Host side of kernels_cl/energy.cl and rescale.cl; the twin is jflnr/regression/energy.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/floor.cl; its twin in JAX is jflnr/flr/floor.py."""
+"""Host side of kernels_cl/floor.cl; its twin in JAX is jflnr/regression/floor.py."""
 
 from __future__ import annotations
 

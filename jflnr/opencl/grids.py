@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.level import brightness
-from jflnr.flr.window import REACH
 from jflnr.opencl.context import Context
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.level import brightness
+from jflnr.regression.window import REACH
 
 # Neighbours whose planes lie together.
 GROUP = 8
@@ -52,7 +52,7 @@ class Run(NamedTuple):
     context: Context
     guides: int
     channels: int
-    numbers: AdaptiveParameters
+    numbers: AdaptiveFLR
     shift: Any
     mean: Any
 

@@ -1,6 +1,6 @@
 """One level of adaptive FLR: host side of kernels_cl/features.cl, window.cl and level.cl.
 
-Its twin in JAX is jflnr/flr/level.py.
+Its twin in JAX is jflnr/regression/level.py.
 """
 
 from __future__ import annotations
@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from jflnr.flr.elimination import ROUNDING
-from jflnr.flr.moments import plane_count
 from jflnr.opencl.grids import Grid, Run
+from jflnr.regression.elimination import ROUNDING
+from jflnr.regression.moments import plane_count
 
 
 class Alike(NamedTuple):

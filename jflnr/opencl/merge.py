@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/merge.cl; its twin in JAX is jflnr/flr/merge.py."""
+"""Host side of kernels_cl/merge.cl; its twin in JAX is jflnr/regression/merge.py."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Host side of kernels_cl/moments.cl; its twin in JAX is jflnr/flr/moments.py."""
+"""Host side of kernels_cl/moments.cl; its twin in JAX is jflnr/regression/moments.py."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from jflnr.flr.moments import plane_count
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import brightness_defines
+from jflnr.regression.moments import plane_count
 
 PARTS = 5
 

@@ -1,6 +1,6 @@
 """What the network reads: host side of kernels_cl/network/features.cl and whole.cl.
 
-Its twin in JAX is jflnr/flnr/features.py.
+Its twin in JAX is jflnr/network/features.py.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from jflnr.flnr.features import BLURS, CHANNELS, COUNT, DARK, MOST_SPREAD, OF_GRID, OF_STEP
+from jflnr.network.features import BLURS, CHANNELS, COUNT, DARK, MOST_SPREAD, OF_GRID, OF_STEP
 from jflnr.opencl.adaptive import Step
 from jflnr.opencl.grids import GROUP, Grid, Run
 from jflnr.opencl.network_unet import MARGIN, Maps, new_maps

@@ -1,6 +1,6 @@
 """The U-Net on blocks: host side of kernels_cl/network/convolve.cl and repeat.cl.
 
-Its twin in JAX is jflnr/flnr/unet.py.
+Its twin in JAX is jflnr/network/unet.py.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jflnr.flnr import unet
+from jflnr.network import unet
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP as MARGIN
 
@@ -46,7 +46,7 @@ def _vectors(context: Context) -> int:
 
 
 def apply(context: Context, params: unet.Params, x: Maps) -> list[Maps]:
-    """The outputs of every scale that has a head, fine to coarse; see `jflnr.flnr.unet.apply`."""
+    """The outputs of every scale that has a head, fine to coarse; the twin is `network.unet.apply`."""
     arrays = {name: np.asarray(value, np.float32) for name, value in params.items()}
     widths = [arrays[name].shape[-1] for name in sorted(arrays) if name[:-1] == "encode"]
     x = convolve(context, arrays, "stem", x)

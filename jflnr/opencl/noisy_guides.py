@@ -1,10 +1,10 @@
-"""Host side of kernels_cl/noisy_guides.cl; its twin in JAX is jflnr/flr/noisy_guides.py."""
+"""Host side of kernels_cl/noisy_guides.cl; its twin in JAX is jflnr/images/noisy_guides.py."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from jflnr.flr.noisy_guides import DEPTH, NORMAL
+from jflnr.images.noisy_guides import DEPTH, NORMAL
 from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import guide_arguments, guide_defines

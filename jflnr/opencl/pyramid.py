@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/pyramid.cl; its twin in JAX is jflnr/flr/pyramid.py."""
+"""Host side of kernels_cl/pyramid.cl; its twin in JAX is jflnr/regression/pyramid.py."""
 
 from __future__ import annotations
 

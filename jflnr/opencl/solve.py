@@ -1,16 +1,16 @@
-"""Host side of kernels_cl/solve.cl; its twin in JAX is jflnr/flr/solve.py."""
+"""Host side of kernels_cl/solve.cl; its twin in JAX is jflnr/regression/solve.py."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from jflnr.flr.parameters import Parameters
-from jflnr.flr.solve import regularisation
 from jflnr.opencl.context import Context
+from jflnr.regression.flr import FLR
+from jflnr.regression.solve import regularisation
 
 
 def solve(
-    context: Context, moments: Any, shift: Any, parameters: Parameters, guides: int, channels: int
+    context: Context, moments: Any, shift: Any, method: FLR, guides: int, channels: int
 ) -> Any:
     """Coefficients of the local affine models, one per block (Appendix, Eq. 12-23).
 
@@ -20,7 +20,7 @@ def solve(
     h, pitch = moments.shape[1:]
     width = context.width()
     model = context.empty((guides + 1, channels, h, pitch))
-    eps, eps_prime = map(float, regularisation(parameters))
+    eps, eps_prime = map(float, regularisation(method))
     context.run(
         "solve",
         "solve.cl",

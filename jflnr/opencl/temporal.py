@@ -9,19 +9,18 @@ from typing import Any
 import jax
 import numpy as np
 
-from jflnr import flnr
-from jflnr.denoising import support_of
 from jflnr.frame import Frame
-from jflnr.inputs import adaptive_images
-from jflnr.opencl import adaptive, network, noisy_guides, regression
+from jflnr.methods import DEFAULT, method_of
+from jflnr.opencl import twins
 from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.bmfr import to_device
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
+from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import State, Temporal, parameters_of, prepared
+from jflnr.temporal.sequence import State, Temporal, prepared
 
 PARTS = {f"PART_{i}": 0 for i in range(5)}
 
@@ -39,13 +38,13 @@ def start(frame: Frame, context: Context | None = None) -> State:
 def step(
     state: State,
     frame: Frame,
-    method: str = "flr-adaptive",
+    method: Any = DEFAULT,
     *,
     guides: Sequence[str] | None = None,
-    parameters: Any = None,
     temporal: Temporal | None = None,
     context: Context | None = None,
     on_device: bool = False,
+    **options: Any,
 ) -> tuple[State, Any]:
     """`jflnr.temporal.step` on an OpenCL device: same arguments, same result.
 
@@ -56,10 +55,10 @@ def step(
     Raises `ValueError` or `TypeError` naming the argument; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
-    names, inputs = prepared(state, frame, method, guides)
-    parameters, temporal = parameters_of(method, parameters), temporal or Temporal()
-    smooth = functools.partial(noisy_guides.smooth_guide, context=context)
-    layers = to_layers(context, adaptive_images(inputs, names, smooth=smooth)["guides"])
+    method, names, inputs = prepared(state, frame, method_of(method, **options), guides)
+    temporal = temporal or Temporal()
+    smooth = functools.partial(smooth_guide, context=context)
+    layers = to_layers(context, method.images(inputs, names, smooth=smooth)["guides"])
     sample, motion = (to_device(context, layer) for layer in (frame.indirect, frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
     covered = to_device(context, frame.depth * 0 + 1 if frame.mask is None else frame.mask)
@@ -71,7 +70,8 @@ def step(
     )  # fmt: skip
     least = temporal.light, temporal.image
     light, weight = accumulate(context, light, change, sample, covered, least[0])
-    fitted = _fit(context, light.mean, layers, weight, parameters, method)
+    images = {"target": light.mean, "guides": layers, "weight": weight}
+    fitted = twins.regress(method, images, context, on_device=True)
     image, _ = accumulate(context, image, change, fitted, covered, least[1])
     result: Any = image.mean
     context.finish(result, result)
@@ -134,16 +134,3 @@ def accumulate(
 
 def _new_average(context: Context, height: int, width: int) -> Average:
     return Average(context.empty((height, width, 3)), context.empty((height, width, 1)))
-
-
-def _fit(
-    context: Context, target: Any, guides: Any, weight: Any, parameters: Any, method: str
-) -> Any:
-    """The spatial method; see `jflnr.temporal.sequence`."""
-    options: dict[str, Any] = {"weight": weight, "context": context, "on_device": True}
-    if method == "flr":
-        support = support_of(parameters, max(target.shape))
-        return regression.flr(target, guides, parameters, support=support, **options)
-    if method in flnr.METHODS:
-        return network.flnr(target, guides, parameters, **options)
-    return adaptive.flr_adaptive(target, guides, parameters, **options)

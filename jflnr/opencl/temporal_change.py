@@ -5,23 +5,21 @@ Its twin in JAX is jflnr/temporal/change.py.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.moments import plane_count
-from jflnr.flr.window import REACH
 from jflnr.opencl.apply import apply
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP, Grid, Run, brightness_defines
 from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.moments import centre, collect
+from jflnr.regression.adaptive import DEFAULT
+from jflnr.regression.moments import plane_count
+from jflnr.regression.window import REACH
 from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY, UNCOVERED
 
-NUMBERS = jax.tree.map(lambda number: math.exp(float(number)), ADAPTIVE_DEFAULT)
+NUMBERS = DEFAULT
 # Planes that are averaged over the windows, see change.cl.
 PLANES = 5
 

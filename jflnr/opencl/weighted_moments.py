@@ -1,13 +1,13 @@
-"""Host side of kernels_cl/weighted_moments.cl; its twin in JAX is jflnr/flr/weighted_moments.py."""
+"""Host side of kernels_cl/weighted_moments.cl; the twin is jflnr/regression/weighted_moments.py."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from jflnr.flr.moments import plane_count
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import Grid, Run, brightness_defines
 from jflnr.opencl.moments import guide_arguments, pixel_defines
+from jflnr.regression.moments import plane_count
 
 
 def collect_weighted(

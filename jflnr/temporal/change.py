@@ -12,14 +12,13 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jflnr.flr.adaptive import light_of
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
-from jflnr.flr.apply import apply
-from jflnr.flr.level import Fit, Grid, fit_level, mean_guides, predict, windowed
-from jflnr.flr.moments import Guides, centre, collect
-from jflnr.flr.weighted_moments import collect_weighted
-from jflnr.flr.widths import guide_features
-from jflnr.flr.window import gather
+from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, light_of
+from jflnr.regression.apply import apply
+from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.moments import Guides, centre, collect
+from jflnr.regression.weighted_moments import collect_weighted
+from jflnr.regression.widths import guide_features
+from jflnr.regression.window import gather
 
 # Side of the blocks in pixels. Windows have a standard deviation of two of them: from one sample
 # per pixel less cannot be told from noise.
@@ -76,7 +75,7 @@ def find_change(
     to denoise, with a history and without, else 0.
     Returns the change, and the evidence for the next frame.
     """
-    numbers, shift, unit = ADAPTIVE_DEFAULT.numbers(), centre(guides), _mean(expected, known)
+    numbers, shift, unit = DEFAULT, centre(guides), _mean(expected, known)
     difference, expected = difference / unit, jnp.maximum(expected / unit, 0)
     light = light_of(difference)
     usable = jnp.isfinite(light)
@@ -112,7 +111,7 @@ def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:
     return jnp.where(mean > 0, mean, 1)
 
 
-def _fit(grid: Grid, shift: jax.Array, channels: int, numbers: AdaptiveParameters) -> Fit:
+def _fit(grid: Grid, shift: jax.Array, channels: int, numbers: AdaptiveFLR) -> Fit:
     """Its variance is told by its residuals (as in `level.py`), which without a change are the
     differences themselves."""
     features = guide_features(grid, shift.size, numbers)

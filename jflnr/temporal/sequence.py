@@ -1,4 +1,4 @@
-"""Denoising frame after frame: one step function for the spatial methods (docs/temporal.md).
+"""Denoising frame after frame: one step function for all spatial methods (docs/temporal.md).
 
 The noisy light is averaged over time, the spatial method fits the average, and its results are
 averaged again. What the light has become since is found first and added to both averages.
@@ -13,19 +13,15 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jflnr import checks, flnr
-from jflnr.denoising import support_of
-from jflnr.flr.adaptive import flr_adaptive, light_of
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr import checks
 from jflnr.frame import Array, Frame
-from jflnr.inputs import adaptive_images, prepare
+from jflnr.images.inputs import prepare
+from jflnr.methods import DEFAULT, method_of
+from jflnr.regression.adaptive import light_of
+from jflnr.stages import regress
 from jflnr.temporal.accumulate import Average, accumulate, nothing, reproject
 from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
 from jflnr.temporal.reproject import Surface, find_taps
-
-METHODS = ("flr", "flr-adaptive", *flnr.METHODS)
 
 
 class Temporal(NamedTuple):
@@ -65,46 +61,37 @@ def start(frame: Frame) -> State:
 def step(
     state: State,
     frame: Frame,
-    method: str = "flr-adaptive",
+    method: Any = DEFAULT,
     *,
     guides: Sequence[str] | None = None,
-    parameters: Any = None,
     temporal: Temporal | None = None,
+    **options: Any,
 ) -> tuple[State, jax.Array]:
     """Denoise the next frame of a sequence.
 
     state: from `start` or from the frame before. frame: with `motion`; where only the camera moves
     `camera_motion` finds it, and zeros say that nothing does. The first frame's does not count.
-    method: one of `METHODS`. guides, parameters: as of `jflnr.denoise`.
+    method, guides, options: as of `jflnr.denoise`; a method that has stages.
     Returns the state for the next frame, and `(H, W, C)`, demodulated indirect radiance.
 
     Raises `ValueError` or `TypeError` naming the argument.
     """
-    names, inputs = prepared(state, frame, method, guides)
-    parameters = parameters_of(method, parameters)
-    support = support_of(parameters, max(frame.normal.shape)) if method == "flr" else 0
+    method, names, inputs = prepared(state, frame, method_of(method, **options), guides)
     surface = jax.tree.map(jnp.asarray, Surface.of(frame))
-    light, image, evidence = _step(
-        state,
-        inputs,
-        frame.motion,
-        surface,
-        parameters,
-        temporal or Temporal(),
-        method,
-        names,
-        support,
-    )
+    past = temporal or Temporal()
+    light, image, evidence = _step(state, inputs, frame.motion, surface, method, past, names)
     # The surface and the image twice would be copied if the program returned them.
     return State(surface, light, image, evidence), image.mean
 
 
 def prepared(
-    state: State, frame: Frame, method: str, guides: Sequence[str] | None
-) -> tuple[tuple[str, ...], Frame]:
-    """Names of the guides, and the layers to denoise, if method, state and frame fit together."""
-    checks.choice("method", method, METHODS)
-    names, inputs = prepare(frame, guides)
+    state: State, frame: Frame, method: Any, guides: Sequence[str] | None
+) -> tuple[Any, tuple[str, ...], Frame]:
+    """The method for the frame, names of the guides and the layers to denoise, if all of it and the
+    state fit together."""
+    if not hasattr(method, "stages"):
+        raise ValueError(f"method {method.name} denoises frames by themselves, not over time")
+    names, inputs = prepare(frame, guides, method)
     if frame.motion is None:
         raise ValueError(
             "the frame has no layer motion, so nobody knows where its pixels were one frame ago: "
@@ -118,53 +105,37 @@ def prepared(
             f"the state is of frames of shape {state.light.mean.shape}, and this frame's indirect "
             f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
         )
-    return names, inputs
+    return method.for_frame(inputs, names), names, inputs
 
 
-def parameters_of(method: str, given: Any) -> Any:
-    """The method's parameters, those that are given or else the default."""
-    default: Any = DEFAULT if method == "flr" else ADAPTIVE_DEFAULT
-    if method in flnr.METHODS:
-        from jflnr.flnr import weights
-
-        default = weights.shipped(method)
-    if given is not None and type(given) is not type(default):
-        raise TypeError(
-            f"parameters of method {method} must be {type(default).__name__}; "
-            f"got {type(given).__name__}"
-        )
-    return default if given is None else given
-
-
-@functools.partial(jax.jit, static_argnames=("method", "names", "support"))
+@functools.partial(jax.jit, static_argnames="names")
 def _step(
     state: State,
     frame: Frame,
     motion: Array,
     surface: Surface,
-    parameters: Any,
+    method: Any,
     temporal: Temporal,
-    method: str,
     names: tuple[str, ...],
-    support: int,
 ) -> tuple[Average, Average, Evidence]:
-    images = adaptive_images(frame, names)
-    guides, mask = images["guides"], images["weight"]
+    images = method.images(frame, names)
+    mask = images["weight"]
     taps = find_taps(motion, surface, state.surface)
     light, image = reproject(state.light, taps), reproject(state.image, taps)
     known, covered = light.samples[..., 0] > 0, True if mask is None else mask
     change, evidence = find_change(
         jnp.asarray(frame.indirect) - light.mean,
         light_of(image.mean),
-        guides,
+        images["guides"],
         jnp.where(known & covered, 1.0, 0.0),
         jnp.where(~known & covered, 1.0, 0.0),
         state.evidence,
         temporal.caution,
     )
     light = accumulate(_changed(light, change), frame.indirect, temporal.light)
+    # A pixel counts as much as the frames that it has been seen in.
     weight = light.samples[..., 0] if mask is None else jnp.where(mask, light.samples[..., 0], 0)
-    fitted = _fit(light.mean, guides, weight, parameters, method, support)
+    fitted = regress(method, images | {"target": light.mean, "weight": weight})["image"]
     image = accumulate(_changed(image, change), fitted, temporal.image)
     return light, image, evidence
 
@@ -173,21 +144,3 @@ def _changed(average: Average, change: Change) -> Average:
     """An average that follows the light."""
     mean, n = average
     return Average(jnp.where(n > 0, mean + change.signal, 0), n / (1 + change.noise * n))
-
-
-def _fit(
-    target: jax.Array,
-    guides: tuple[jax.Array, ...],
-    weight: jax.Array,
-    parameters: Any,
-    method: str,
-    support: int,
-) -> jax.Array:
-    """The spatial method, for which a pixel counts as much as the frames that it has been seen."""
-    if method == "flr":
-        return flr(target, guides, parameters, weight=weight, support=support)
-    if method == "flr-adaptive":
-        return flr_adaptive(target, guides, parameters, weight=weight)
-    from jflnr.flnr import regression
-
-    return regression.flnr(target, guides, parameters, weight=weight)

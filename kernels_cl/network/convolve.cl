@@ -1,4 +1,4 @@
-// A layer of the network (jflnr/flnr/unet.py): convolution, bias, LeakyReLU.
+// A layer of the network (jflnr/network/unet.py): convolution, bias, LeakyReLU.
 //
 // Defines beside WIDTH: SIDE of the kernel in blocks, 1 or 3; STRIDE, 1 or 2; TOGETHER, the outputs of
 // one work-item, VECTORS, how many WIDTH neighbours it has of each: TOGETHER x VECTORS sums stay in

@@ -1,4 +1,4 @@
-// What the network reads (jflnr/flnr/features.py), in a map on blocks twice as large as the finest.
+// What the network reads (jflnr/network/features.py), in a map on blocks twice as large as the finest.
 //
 // Defines beside those of the headers: COUNT, the number of planes of moments; CHANNELS, those of the
 // map; MOST_SPREAD, above which a guide's variance is cut; LOG, if `spread` and `tent` give light as

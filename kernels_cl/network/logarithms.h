@@ -1,4 +1,4 @@
-// Light as the network reads it (jflnr/flnr/features.py). Comes after vectors.h.
+// Light as the network reads it (jflnr/network/features.py). Comes after vectors.h.
 //
 // Define: DARK, the share of the frame's mean below which light is as good as dark.
 

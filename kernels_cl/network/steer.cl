@@ -1,4 +1,4 @@
-// What the network says, done (jflnr/flnr/regression.py): windows that are steered, and gains.
+// What the network says, done (jflnr/network/flnr.py): windows that are steered, and gains.
 //
 // It gives, for every one of the finest blocks, ALIKE planes that are added to what must be alike in a
 // window, the logarithms of factors on the window's width and on what the block weighs, and C logarithms

@@ -16,7 +16,7 @@ INLINE real mean_guides(global const float *moments, real *guides)
     return inverse;
 }
 
-// values: OF_STEP, see `of_step` in jflnr/flnr/features.py. level: brightness known before. fine:
+// values: OF_STEP, see `of_step` in jflnr/network/features.py. level: brightness known before. fine:
 // models there. at: the same blocks in the models of the coarser grid, share_at in its share.
 INLINE void step_values(
     const real *guides, real level, global const float *fine, const coarse_t *at,

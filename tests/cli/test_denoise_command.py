@@ -22,9 +22,9 @@ from PIL import Image
 from jflnr import denoising, exr, metrics
 from jflnr.cli import main
 from jflnr.cli.jobs import plan
-from jflnr.flnr.weights import FOLDER, shipped
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 from jflnr.metrics import exposure
+from jflnr.network.weights import FOLDER, shipped
 
 
 @pytest.fixture

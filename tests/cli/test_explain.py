@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from jflnr import denoising
+from jflnr.auto import method
+from jflnr.auto.plan import Plan
 from jflnr.cli import main
 from jflnr.frame import Frame
-from jflnr.selection import method
-from jflnr.selection.plan import Plan
 
 
 @pytest.fixture

@@ -11,9 +11,10 @@ import pytest
 import jflnr
 from jflnr import exr, fitting
 from jflnr.cli import main
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT, AdaptiveParameters
-from jflnr.flr.parameters import Parameters, load_parameters
 from jflnr.frame import Frame, read_frame, write_frame
+from jflnr.parameters import load_parameters
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.flr import FLR
 
 
 @pytest.fixture
@@ -29,9 +30,9 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
     ) -> fitting.Fit:
         calls.append({"frames": len(frames), "method": method, **settings})
         progress(1, 0.25)
-        numbers = Parameters.of(20, 1e-3, 1e-4)
+        numbers = FLR(20, 1e-3, 1e-4)
         if method == "flr-adaptive":
-            return fitting.Fit(ADAPTIVE_DEFAULT.but(sigma=1.5), -20, -21, 1)
+            return fitting.Fit(AdaptiveFLR(sigma=1.5), -20, -21, 1)
         return fitting.Fit(numbers, 0.5, 0.25, 1)
 
     monkeypatch.setattr(fitting, "fit", fit)
@@ -68,8 +69,8 @@ def test_parameters_are_for_the_method_they_were_fitted_for(
     assert main(argv) == 0
     assert "sigma 1.5, eps 0.0001" in capsys.readouterr().out
     found, about = load_parameters(params)
-    assert isinstance(found, AdaptiveParameters) and "block" not in about
-    np.testing.assert_allclose(found, ADAPTIVE_DEFAULT.but(sigma=1.5), rtol=1e-6)
+    assert isinstance(found, AdaptiveFLR) and "block" not in about
+    np.testing.assert_allclose(found, AdaptiveFLR(sigma=1.5), rtol=1e-6)
     denoise = ["denoise", str(frame_file), "-o", str(out), "--params", str(params)]
     assert main([*denoise, "--method", "flr-adaptive", "--quiet"]) == 0
     light = exr.read_channels(out / frame_file.name)["indirect.G"]

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from jflnr import cluster, exr, history, temporal
+from jflnr.bmfr import pipeline as bmfr
 from jflnr.cli import main
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.shots import shots_of
 from jflnr.frame import Frame, read_frame, write_frame
 from jflnr.opencl import NoDevice, all_devices
-from jflnr.temporal import bmfr
 
 NAMES = [f"f_{i}.exr" for i in (1, 2, 3, 10)]  # in an order that is not that of the alphabet
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.regression.flr import DEFAULT, flr
 
 ROOT = Path(__file__).parents[2]
 

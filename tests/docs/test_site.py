@@ -12,8 +12,9 @@ from sybil.parsers import markdown
 
 from jflnr import exr
 from jflnr.cli import main
-from jflnr.flr.parameters import DEFAULT, save_parameters
 from jflnr.frame import Frame, write_frame
+from jflnr.parameters import save_parameters
+from jflnr.regression.flr import DEFAULT
 from tests.layouts.blender_passes import passes
 
 ROOT = Path(__file__).parents[2]

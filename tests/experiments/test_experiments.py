@@ -12,7 +12,7 @@ from experiments.lightgroups import error_of_sum, grouped
 from experiments.pareto import pareto_front
 from experiments.regularisation import denoised, normalised, tikhonov
 from experiments.upsample import traced_at
-from jflnr.flr.parameters import DEFAULT
+from jflnr.regression.flr import DEFAULT
 
 
 def test_position_from_depth_is_the_layer(data):

@@ -11,8 +11,8 @@ from experiments import noise, resume, training
 from experiments.__main__ import main
 from experiments.data import SHIPPED
 from experiments.finetune import crops_of
-from jflnr.flnr import examples
-from jflnr.flnr.adam import Adam
+from jflnr.network import examples
+from jflnr.network.adam import Adam
 
 
 def test_descent_counts_its_own_time_and_gives_the_running_mean(monkeypatch):

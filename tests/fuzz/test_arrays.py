@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import jflnr
-from jflnr.flr.parameters import DEFAULT, Parameters
-from jflnr.flr.regression import flr
 from jflnr.frame import Frame
+from jflnr.regression.flr import DEFAULT, flr
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
 long = functools.partial(

@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from jflnr.cli import main
-from jflnr.flr.adaptive_parameters import AdaptiveParameters
-from jflnr.flr.parameters import load_parameters
+from jflnr.parameters import load_parameters
+from jflnr.regression.adaptive import AdaptiveFLR
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
 long = functools.partial(settings, deadline=None, database=None)
@@ -97,7 +97,7 @@ FILES = st.one_of(
         },
     ).map(lambda d: json.dumps(d).encode()),
     st.fixed_dictionaries(
-        dict.fromkeys(AdaptiveParameters._fields, NUMBERS),
+        dict.fromkeys(AdaptiveFLR._fields, NUMBERS),
         optional={"method": st.sampled_from(["flr", "flr-adaptive", "auto", None, 1, [], {}])},
     ).map(lambda d: json.dumps({"format": "jflnr-parameters", "version": 1, **d}).encode()),
 )

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from jflnr import flnr, history
-from jflnr.flnr import weights
+from jflnr.network import weights
 from tests.fuzz.test_arrays import long, short
 
 reuse = [HealthCheck.function_scoped_fixture, *HealthCheck]

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import jflnr
 from jflnr import temporal
+from jflnr.bmfr import pipeline as bmfr
 from jflnr.frame import Frame
-from jflnr.temporal import bmfr
 from tests.fuzz.test_arrays import ANYTHING, FRAMES, HEIGHT, WIDTH, image, long, refused, short
 
 SIZE = HEIGHT, WIDTH

@@ -6,21 +6,20 @@ import numpy as np
 import pytest
 from jax import random
 
-from jflnr.flnr import paper, regression
-from jflnr.flnr.loss import relative
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.elimination import solve_strips
-from jflnr.flr.energy import rescale, restore
-from jflnr.flr.moments import collect, plane_count
-from jflnr.flr.noisy_guides import smooth_guide
-from jflnr.flr.parameters import Parameters
-from jflnr.flr.pyramid import double, halve
-from jflnr.flr.solve import cholesky_solve, solve
-from jflnr.flr.uncertainty import flr_adaptive_with_error
-from jflnr.flr.weighted_moments import collect_weighted
-from jflnr.flr.window import gather_moments, window_over
+from jflnr.auto import nested
 from jflnr.frame import Frame, composite
-from jflnr.selection import nested
+from jflnr.images.noisy_guides import smooth_guide
+from jflnr.network import paper, regression
+from jflnr.network.loss import relative
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.elimination import solve_strips
+from jflnr.regression.energy import rescale, restore
+from jflnr.regression.flr import FLR
+from jflnr.regression.moments import collect, plane_count
+from jflnr.regression.pyramid import double, halve
+from jflnr.regression.solve import cholesky_solve, solve
+from jflnr.regression.weighted_moments import collect_weighted
+from jflnr.regression.window import gather_moments, window_over
 from jflnr.temporal import (
     Average,
     Camera,
@@ -38,7 +37,7 @@ from tests.gradients.directions import agree
 
 SIZE = 6, 7
 SHIFT = np.array([0.1, -0.2])
-PARAMETERS = Parameters.of(sigma=5.0, eps=1e-2, eps_prime=1e-2)
+PARAMETERS = FLR(sigma=5.0, eps=1e-2, eps_prime=1e-2)
 RNG = np.random.default_rng(2)
 
 
@@ -184,7 +183,7 @@ FRAMES = LIGHT, 1.1 * LIGHT + 0.1 * positive(*SIZE, 3)
 WHOLE = {
     "adaptive FLR and its error": (
         lambda y, x, p: flr_adaptive_with_error(y, x, p),
-        (positive(40, 48, 3), normal(40, 48, 2), ADAPTIVE_DEFAULT),
+        (positive(40, 48, 3), normal(40, 48, 2), AdaptiveFLR()),
     ),
     "FLNR": (
         lambda y, x, w: regression.flnr(y, x, w),

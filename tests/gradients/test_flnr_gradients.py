@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jflnr.flnr import features, loss, regression, unet
-from jflnr.flnr.examples import Example
-from jflnr.flr.moments import collect
+from jflnr.network import features, loss, regression, unet
+from jflnr.network.examples import Example
+from jflnr.regression.moments import collect
 
 GUIDES = 5
 

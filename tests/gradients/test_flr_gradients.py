@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from jax.test_util import check_grads
 
-from jflnr.flr.apply import apply
-from jflnr.flr.blur import blur, gaussian_taps
-from jflnr.flr.moments import collect
-from jflnr.flr.parameters import Parameters
-from jflnr.flr.regression import flr
-from jflnr.flr.solve import block_inverse_solve, cholesky_solve, solve
+from jflnr.regression.apply import apply
+from jflnr.regression.blur import blur, gaussian_taps
+from jflnr.regression.flr import FLR, flr
+from jflnr.regression.moments import collect
+from jflnr.regression.solve import block_inverse_solve, cholesky_solve, solve
 
-PARAMETERS = Parameters.of(sigma=5.0, eps=1e-2, eps_prime=1e-2)
+PARAMETERS = FLR(sigma=5.0, eps=1e-2, eps_prime=1e-2)
 SHIFT = np.array([0.1, -0.2])
 
 

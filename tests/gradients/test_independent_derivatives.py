@@ -12,8 +12,7 @@ from experiments.stability import solvers
 from experiments.stability.cases import make
 from experiments.stability.methods import by_numpy
 from jflnr.fitting import smape
-from jflnr.flr.parameters import DEFAULT, Parameters
-from jflnr.flr.regression import flr
+from jflnr.regression.flr import DEFAULT, FLR, flr
 
 
 @jax.jit
@@ -56,7 +55,7 @@ def derivatives_agree(problem):
     """Forward mode against Richardson's extrapolation, reverse mode against forward mode."""
     rng = np.random.default_rng(problem["seed"])
     size, block = problem["size"], problem["block"]
-    parameters = Parameters.of(problem["sigma"], 1e-3, 1e-2)
+    parameters = FLR(problem["sigma"], 1e-3, 1e-2)
     with jax.enable_x64(True):
 
         def normal(count):

@@ -74,7 +74,7 @@ def test_options_of_flr_hold_in_strips(rng):
     coarse = room(rng, 45, 33).indirect
     position = np.concatenate([fine.depth, fine.ao, fine.depth], axis=-1) + 100
     frame = dataclasses.replace(fine, indirect=coarse, position=position)
-    options = {"guides": ("normal", "position"), "parameters": jflnr.Parameters.of(9, 1e-4, 1e-3)}
+    options = {"guides": ("normal", "position"), "parameters": jflnr.FLR(9, 1e-4, 1e-3)}
     whole = np.asarray(jflnr.denoise(frame, block=4, **options))
     assert relative(jflnr.denoise(frame, block=4, tile=30, **options), whole) < RELATIVE
 

@@ -8,10 +8,10 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.flr.parameters import Parameters
 from jflnr.opencl import Context, NoDevice
+from jflnr.regression.flr import FLR
 
-PARAMETERS = Parameters.of(sigma=12.0, eps=1e-3, eps_prime=1e-4)
+PARAMETERS = FLR(sigma=12.0, eps=1e-3, eps_prime=1e-4)
 
 
 @pytest.fixture(scope="session")

@@ -8,15 +8,15 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.flr.adaptive import flr_adaptive as jax_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.noisy_guides import smooth_guide as jax_smooth
+from jflnr.images.noisy_guides import smooth_guide as jax_smooth
 from jflnr.opencl import Context, flr_adaptive, smooth_guide
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.adaptive import flr_adaptive as jax_adaptive
 from tests.opencl import tolerances
 from tests.opencl.conftest import error, scene
 
 SIZE = (61, 203)
-PARAMETERS = ADAPTIVE_DEFAULT.but(exponent=0.8)
+PARAMETERS = AdaptiveFLR(exponent=0.8)
 # Guides that the JAX program is compiled for. One that is zero changes nothing.
 MOST = 8
 
@@ -61,7 +61,7 @@ def test_exponent_of_one(context: Context) -> None:
     """It is built without the power, and must be where the others end."""
     target, guides = scene(*SIZE, 5, 3)
     found, right = (
-        flr_adaptive(target, guides, PARAMETERS.but(exponent=exponent), context=context)
+        flr_adaptive(target, guides, AdaptiveFLR(exponent=exponent), context=context)
         for exponent in (1.0, 1.000001)
     )
     assert error(found, right) < tolerances.ADAPTIVE

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import jflnr
+from jflnr.bmfr import pipeline as bmfr
 from jflnr.opencl import Context
 from jflnr.opencl import bmfr as kernels
 from jflnr.opencl.profile import profile
-from jflnr.temporal import bmfr
 from tests.opencl import tolerances
 from tests.opencl.conftest import error
 from tests.temporal.bmfr_shot import shot
@@ -38,7 +38,7 @@ def frames() -> list[jflnr.Frame]:
 
 def compare(context: Context, frames: list[jflnr.Frame], **parameters: Any) -> None:
     """Both over the same frames, each with its own history."""
-    settings = bmfr.BmfrParameters(**parameters)
+    settings = bmfr.BMFR(**parameters)
     ours, right = kernels.start(frames[0], context), bmfr.start(frames[0])
     for frame in frames:
         ours, found = kernels.step(ours, frame, settings, context=context)
@@ -77,7 +77,7 @@ def test_a_plane_is_nan_without_noise_and_not_with_it(context: Context) -> None:
     frame = shot(1, 40, 40)[0]
     for noise, sound in ((0.0, False), (0.01, True)):
         _, image = kernels.step(
-            kernels.start(frame, context), frame, bmfr.BmfrParameters(noise=noise), context=context
+            kernels.start(frame, context), frame, bmfr.BMFR(noise=noise), context=context
         )
         assert np.isfinite(image).all() == sound
 

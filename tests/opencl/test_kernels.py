@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from jflnr.flr import apply as jax_apply
-from jflnr.flr import blur as jax_blur
-from jflnr.flr import moments as jax_moments
-from jflnr.flr import solve as jax_solve
 from jflnr.opencl import Context
 from jflnr.opencl.apply import apply
 from jflnr.opencl.blur import blur
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.solve import solve
+from jflnr.regression import apply as jax_apply
+from jflnr.regression import blur as jax_blur
+from jflnr.regression import moments as jax_moments
+from jflnr.regression import solve as jax_solve
 from tests.opencl import tolerances
 from tests.opencl.conftest import PARAMETERS, error, in_float64, scene
 

@@ -12,8 +12,8 @@ import pytest
 import jflnr
 from jflnr import flnr as networks
 from jflnr.cli import main
-from jflnr.flnr import features, regression, unet
-from jflnr.flnr.weights import shipped
+from jflnr.network import features, regression, unet
+from jflnr.network.weights import shipped
 from jflnr.opencl import Context, flnr, network, network_unet
 from jflnr.opencl.arguments import to_image, to_layers, to_weight
 from jflnr.opencl.network_unet import MARGIN, Maps

@@ -9,11 +9,11 @@ import pytest
 
 import jflnr
 from jflnr.cli import main
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.noisy_guides import smooth_guide
-from jflnr.guides import DEFAULT, layers
+from jflnr.images.guides import DEFAULT, layers
+from jflnr.images.noisy_guides import smooth_guide
 from jflnr.opencl import Context, flr, flr_adaptive
 from jflnr.opencl.profile import profile
+from jflnr.regression.adaptive import AdaptiveFLR
 from tests.opencl import tolerances
 from tests.opencl.conftest import PARAMETERS, error, scene
 
@@ -75,7 +75,7 @@ def test_denoise_adaptive_backend(context: Context, frame: jflnr.Frame) -> None:
         right = flr_adaptive(
             frame.indirect,
             (normal, depth, smooth),
-            ADAPTIVE_DEFAULT,
+            AdaptiveFLR(),
             weight=weight,
             keep_energy=keep_energy,
             context=context,

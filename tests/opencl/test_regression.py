@@ -1,4 +1,4 @@
-"""The four kernels together, against `jflnr.flr.regression.flr` and its twin in plain numpy."""
+"""The four kernels together, against `jflnr.regression.flr.flr` and its twin in plain numpy."""
 
 from pathlib import Path
 from typing import Any
@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import jflnr
-from jflnr import guides as guide_layers
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr as jax_flr
+from jflnr.images import guides as guide_layers
 from jflnr.opencl import Context, flr
+from jflnr.regression.flr import DEFAULT
+from jflnr.regression.flr import flr as jax_flr
 from tests.opencl import tolerances
 from tests.opencl.conftest import PARAMETERS, error, in_float64, scene
 from tests.oracle.flr_numpy import flr as numpy_flr

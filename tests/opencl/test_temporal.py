@@ -11,7 +11,7 @@ import pytest
 import jflnr
 from jflnr import temporal
 from jflnr.denoising import SHIPPED_FRAME
-from jflnr.inputs import adaptive_images, prepare
+from jflnr.images.inputs import prepare, robust_images
 from jflnr.opencl import Context, flnr, flr_adaptive, smooth_guide
 from jflnr.opencl import temporal as kernels
 from jflnr.temporal.change import BLOCK
@@ -66,7 +66,7 @@ def test_the_first_frame_is_denoised_as_by_itself(
     frame = dataclasses.replace(frame, motion=np.zeros((64, 96, 2), np.float32))
     found = kernels.step(kernels.start(frame, context), frame, method, context=context)[1]
     smooth = functools.partial(smooth_guide, context=context)
-    images = adaptive_images(*prepare(frame, None)[::-1], smooth=smooth)
+    images = robust_images(*prepare(frame, None)[::-1], smooth=smooth)
     right = alone(
         images["target"],
         images["guides"],

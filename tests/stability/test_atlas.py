@@ -11,9 +11,8 @@ from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
 from experiments.stability.measures import measure, passes
 from experiments.stability.methods import EXACT, METHODS, ON_DEVICE
-from jflnr.flr.parameters import Parameters
-from jflnr.flr.regression import flr
 from jflnr.opencl import flr as on_device
+from jflnr.regression.flr import flr
 
 MANY = "16 guides, rank 5"
 FIVE_GUIDES = [case for case in CASES if case != MANY]

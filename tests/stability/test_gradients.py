@@ -9,12 +9,10 @@ import pytest
 
 from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
-from jflnr.flnr.regression import flnr
-from jflnr.flnr.weights import shipped
-from jflnr.flr.adaptive import flr_adaptive
-from jflnr.flr.adaptive_parameters import ADAPTIVE_DEFAULT
-from jflnr.flr.parameters import DEFAULT
-from jflnr.flr.regression import flr
+from jflnr.network.flnr import flnr
+from jflnr.network.weights import shipped
+from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
+from jflnr.regression.flr import DEFAULT, flr
 
 FIVE_GUIDES = [case for case in CASES if "16" not in case]
 
@@ -60,7 +58,7 @@ def test_flr_of_16_guides():
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
 @pytest.mark.parametrize("case", FIVE_GUIDES)
 def test_flr_adaptive(case):
-    is_finite(flr_adaptive, case, ADAPTIVE_DEFAULT, np.array([0]))
+    is_finite(flr_adaptive, case, AdaptiveFLR(), np.array([0]))
 
 
 @pytest.mark.slow  # compiles long
@@ -74,9 +72,9 @@ def test_flnr(case):
     ("method", "parameters"),
     [
         (wide_flr, DEFAULT),
-        (flr_adaptive, ADAPTIVE_DEFAULT),
-        (flr_adaptive, ADAPTIVE_DEFAULT.but(sigma=0.85)),
-        (flr_adaptive, ADAPTIVE_DEFAULT.but(sigma=0.4)),
+        (flr_adaptive, AdaptiveFLR()),
+        (flr_adaptive, AdaptiveFLR(sigma=0.85)),
+        (flr_adaptive, AdaptiveFLR(sigma=0.4)),
     ],
 )
 def test_far_from_all_light(method, parameters):

@@ -156,7 +156,7 @@ def test_denoise_is_the_first_step(room):
     [
         ({}, {"guides": ("normal",)}, ValueError, "own features"),
         ({}, {"block": 16}, ValueError, "own features and blocks"),
-        ({}, {"parameters": jflnr.Parameters.of(8, 1e-3, 1e-3)}, TypeError, "BmfrParameters"),
+        ({}, {"parameters": jflnr.FLR(8, 1e-3, 1e-3)}, TypeError, "BMFR"),
         ({"indirect": np.ones((40, 56, 6), np.float32)}, {}, ValueError, "3 channels"),
         ({"motion": np.ones((40, 55, 2), np.float32)}, {}, ValueError, "motion is 55 x 40"),
     ],

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jflnr.bmfr.fit import OFFSETS, grid_offset, mirrored, triangle, uniform
 from jflnr.temporal import bmfr, bmfr_fit
-from jflnr.temporal.bmfr_fit import OFFSETS, grid_offset, mirrored, triangle, uniform
 from tests.temporal.bmfr_shot import shot
 
 fit = jax.jit(bmfr_fit.fit, static_argnames=("block", "squares"))

@@ -135,7 +135,7 @@ def test_errors() -> None:
         temporal.step(state, dataclasses.replace(frame, motion=None))
     with pytest.raises(ValueError, match="method must be one of flr"):
         temporal.step(state, frame, "svgf")
-    with pytest.raises(TypeError, match="must be AdaptiveParameters; got Parameters"):
-        temporal.step(state, frame, parameters=jflnr.Parameters.of(15, 1e-5, 1e-3))
+    with pytest.raises(TypeError, match="must be AdaptiveFLR; got Parameters"):
+        temporal.step(state, frame, parameters=jflnr.FLR(15, 1e-5, 1e-3))
     with pytest.raises(ValueError, match="another size"):
         temporal.step(state, jax.tree.map(lambda layer: layer[:40], frame))

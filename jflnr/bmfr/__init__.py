@@ -1,0 +1,1 @@
+"""Blockwise Multi-Order Feature Regression (Koskela et al. 2019)."""

@@ -1,0 +1,122 @@
+"""The images that a regression takes: the light, the guides, and which pixels count."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from jflnr import checks
+from jflnr.frame import Array, Frame
+from jflnr.images import guides as guide_layers
+from jflnr.images.noisy_guides import smooth_guide
+
+
+def prepare(
+    frame: Frame, guides: Sequence[str] | None, method: Any
+) -> tuple[tuple[str, ...], Frame]:
+    """Names of the guides to use, and the checked layers that denoising reads.
+
+    Raises `ValueError` or `TypeError` naming the argument. Warns if the frame has no occlusion.
+    """
+    own = hasattr(method, "features")
+    if own and guides is not None:
+        raise ValueError(
+            f"method {method.name} has its own features, {' and '.join(method.features)}; guides "
+            "are for other methods"
+        )
+    names = guide_layers.choose(frame, ("normal", "depth") if own else guides)
+    inputs = frame_inputs(frame, names)
+    _check_sizes(inputs)
+    if guides is None and frame.ao is None and not own:
+        warnings.warn(
+            "The frame has no ao layer, so the guides are normal and depth only; "
+            "shadows cast by indirect light may be lost.",
+            stacklevel=4,
+        )
+    if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
+        raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
+    return names, inputs
+
+
+def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
+    """The frame reduced to the layers that denoising reads, so that others cost nothing."""
+    needed = {"indirect", "normal", "depth", "mask", *names}
+    unused = {field.name: None for field in dataclasses.fields(Frame) if field.name not in needed}
+    return dataclasses.replace(frame, **unused)  # type: ignore[arg-type]
+
+
+def _check_sizes(frame: Frame) -> None:
+    layers = {name: layer for name, layer in vars(frame).items() if name != "indirect"}
+    for name, layer in layers.items():
+        if layer is not None or name in ("normal", "depth"):
+            checks.image(name, layer, 1 if name in ("depth", "ao", "mask") else 3)
+    checks.same_size(**layers)
+    checks.image("indirect", frame.indirect)
+    (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]
+    if checks.times_finer((height, width), (h, w)) is None:
+        raise ValueError(
+            f"frame.indirect is {w} x {h} pixels and the guides are {width} x {height}; "
+            "they must be the same, or the guides a whole number of times larger"
+        )
+
+
+def factor_of(frame: Frame) -> int:
+    """How many times larger the guides are than the light."""
+    return checks.times_finer(frame.normal.shape[:2], frame.indirect.shape[:2]) or 1
+
+
+def same_size(frame: Frame, method: str) -> None:
+    """Raise `ValueError` unless the light has the size of the guides, as `method` needs it."""
+    if frame.indirect.shape[:2] != frame.normal.shape[:2]:
+        raise ValueError(f"method {method} needs frame.indirect at the size of the guides")
+
+
+def plain_images(
+    frame: Frame,
+    names: tuple[str, ...],
+    scene: guide_layers.Scene | None = None,
+    smooth: Callable[..., Array] | None = None,
+) -> dict[str, Any]:
+    """The layers as they are; numpy's stay where they are.
+
+    target: the light. guides: averaged over its pixels, if these are larger. guides_map: the guides
+    that the models are evaluated on, if those are others. weight: which pixels count, or None.
+    scene: of the frame that this one is a part of; the frame's own if None. smooth: not used.
+    """
+    target, mask = frame.indirect, frame.mask
+    layers = guide_layers.layers(frame, names, scene)
+    factor = factor_of(frame)
+    if factor == 1:
+        weight = None if mask is None else mask[..., 0] > 0
+        return {"target": target, "guides": layers, "guides_map": None, "weight": weight}
+    return {
+        "target": target,
+        "guides": tuple(guide_layers.shrink(layer, factor, mask) for layer in layers),
+        "guides_map": layers,
+        "weight": None if mask is None else guide_layers.shrink(mask, factor)[..., 0],
+    }
+
+
+def robust_images(
+    frame: Frame,
+    names: tuple[str, ...],
+    scene: guide_layers.Scene | None = None,
+    smooth: Callable[..., Array] = smooth_guide,
+) -> dict[str, Any]:
+    """`plain_images` with far depths drawn near and ambient occlusion without noise.
+
+    smooth: what takes the noise from a guide, given the normal and the depth.
+    """
+    images = plain_images(frame, names, scene)
+    layers = dict(zip(names, images["guides"], strict=False))
+    if "depth" in layers:
+        layers["depth"] = guide_layers.draw_near(layers["depth"])
+    if "ao" in layers:
+        layers["ao"] = smooth(layers["ao"], frame.normal, frame.depth)
+    # Without names there is one layer of no channels.
+    images["guides"] = tuple(layers.values()) or images["guides"]
+    return images

@@ -1,0 +1,184 @@
+"""Any method on parts of a frame, stage by stage; what lies between them waits in files.
+
+Stages that read pixels run on strips of whole rows, the others on tiles of blocks. A part is worked
+on with as much around it as the stage says that it looks at, so that the result is the whole's.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jflnr.frame import Frame
+from jflnr.images.guides import Scene
+from jflnr.large.pieces import Piece, pieces
+from jflnr.large.planes import Planes
+from jflnr.large.source import Rows, scene_of
+from jflnr.stages import Known, Parts, Stage
+
+# The first row of a strip, and what the last stage gives for it: `image` and more, `(h, W, C)`.
+Strip = tuple[int, Parts]
+
+
+class Kept(NamedTuple):
+    """What a stage gave, in a file. lead: axes before `(h, w)`."""
+
+    planes: Planes
+    side: int
+    lead: tuple[int, ...]
+
+
+@dataclass
+class Job:
+    """A frame to denoise, in strips and tiles of about `tile` x `tile` pixels.
+
+    names: of the guides. folder: for temporary files, the system's own if None. known: of the whole
+    frame. kept: by name, what earlier stages gave.
+    """
+
+    rows: Rows
+    method: Any
+    names: tuple[str, ...]
+    scene: Scene
+    tile: int
+    folder: Path | None
+    files: ExitStack
+    known: Known = field(default_factory=dict)
+    kept: dict[str, Kept] = field(default_factory=dict)
+
+    def places(self, stage: Stage) -> list[tuple[Piece, Piece]]:
+        """Rows and columns of the parts that a stage is run on, in pixels."""
+        height, width, tile = self.rows.height, self.rows.width, self.tile
+        sides = [side for _, side in (*stage.gives, *stage.totals)]
+        sides += [self.kept[name].side for name in stage.reads]
+        align = math.lcm(stage.align, self.rows.factor, *sides)
+        if 1 not in sides and not stage.pixels:
+            down, across = (pieces(n, tile, stage.reach, align) for n in (height, width))
+            return list(itertools.product(down, across))
+        strip, reach = max(tile * tile // width, 1), stage.reach + self.method.margin
+        return [(rows, Piece(0, width, 0, width)) for rows in pieces(height, strip, reach, align)]
+
+    def run(self, stage: Stage, rows: Piece, columns: Piece) -> Parts:
+        """What a stage gives for one part with all around it."""
+        parts = {name: self._read(self.kept[name], rows, columns) for name in stage.reads}
+        if not stage.pixels:
+            return _on_blocks(stage, self.method, parts, self.known)
+        frame = self.rows.read(rows.low, rows.high)
+        images = self.names, self.scene
+        return _on_pixels(stage, self.method, frame, *images, parts, self.known)
+
+    def _read(self, kept: Kept, rows: Piece, columns: Piece) -> Any:
+        found = kept.planes[rows.on(kept.side).outer, columns.on(kept.side).outer]
+        found = found.reshape(*kept.lead, *found.shape[1:])
+        return np.moveaxis(found, 0, -1) if kept.side == 1 else found
+
+    def keep(self, name: str, side: int, inner: np.ndarray, rows: Piece, columns: Piece) -> None:
+        """Keep `(..., h, w)` of one part for later stages."""
+        if name not in self.kept:
+            size = -(-self.rows.height // side), -(-self.rows.width // side)
+            lead = inner.shape[:-2]
+            planes = self.files.enter_context(Planes(self.folder, math.prod(lead), *size))
+            self.kept[name] = Kept(planes, side, lead)
+        flat = inner.reshape(-1, *inner.shape[-2:])
+        self.kept[name].planes[rows.on(side).inner, columns.on(side).inner] = flat
+
+
+def strips(
+    rows: Rows, method: Any, names: tuple[str, ...], tile: int, folder: Path | None = None
+) -> Iterator[Strip]:
+    """The denoised frame in strips from top to bottom."""
+    scene = scene_of(rows)
+    with ExitStack() as files:
+        job = Job(rows, method, names, scene, tile, folder, files)
+        job.known = method.known(sparse_images(job))
+        *stages, last = method.stages()
+        for stage in stages:
+            _complete(job, stage)
+        for y, x in job.places(last):
+            given = job.run(last, y, x)
+            yield y.start, {name: np.asarray(given[name])[y.kept] for name, _ in last.gives}
+
+
+def _complete(job: Job, stage: Stage) -> None:
+    """Run a stage on all parts of the frame."""
+    sums = {name: np.float64(0) for name, _ in stage.totals}
+    for y, x in job.places(stage):
+        given = job.run(stage, y, x)
+        for name, side in (*stage.gives, *stage.totals):
+            found = np.asarray(given[name])
+            pixels = side == 1 and name not in sums
+            found = np.moveaxis(found, -1, 0) if pixels else found
+            inner = found[..., y.on(side).kept, x.on(side).kept]
+            if name in sums:
+                sums[name] = sums[name] + inner.sum((-2, -1), np.float64)
+            else:
+                job.keep(name, side, inner, y, x)
+    if stage.learn is not None:
+        totals = {name: jnp.float32(total) for name, total in sums.items()}
+        job.known = job.known | stage.learn(job.method, job.known, totals)
+
+
+def overlapping(
+    rows: Rows, method: Any, names: tuple[str, ...], tile: int, whole: Any
+) -> Iterator[Strip]:
+    """The denoised frame in strips that overlap by all that its stages look at together.
+
+    whole: denoises the images of a part. For methods that need no sums over the frame.
+    """
+    stages, scene = method.stages(), scene_of(rows)
+    if any(stage.totals for stage in stages):
+        raise ValueError(
+            f"method {method.name} on opencl needs the whole frame in memory: raise --memory, or "
+            "take the jax backend"
+        )
+    align = math.lcm(rows.factor, *(side for stage in stages for _, side in stage.gives))
+    reach = sum(stage.reach for stage in stages) + method.margin
+    for piece in pieces(rows.height, max(tile * tile // rows.width, 1), reach, align):
+        images = method.images(rows.read(piece.low, piece.high), names, scene)
+        yield piece.start, {"image": np.asarray(whole(images))[piece.kept]}
+
+
+def sparse_images(job: Job) -> Parts:
+    """The images of the few rows of a frame that typical values are told from, `(n, W, ...)`."""
+    rows, margin, factor = job.rows, job.method.margin, job.rows.factor
+    height = -(-rows.height // factor)
+    lines = []
+    for row in range(0, height, max(height // 32, 1)):
+        low, high = max(row - margin, 0), min(row + 1 + margin, height)
+        frame = rows.read(low * factor, min(high * factor, rows.height))
+        images = _images(job.method, frame, job.names, job.scene) | {"guides_map": None}
+        lines.append(jax.tree.map(lambda a, at=row - low: a[at : at + 1], images))
+    return jax.tree.map(lambda *some: jnp.concatenate(some), *lines)
+
+
+@functools.partial(jax.jit, static_argnames="names")
+def _images(method: Any, frame: Frame, names: tuple[str, ...], scene: Scene) -> Parts:
+    return method.images(frame, names, scene)
+
+
+@functools.partial(jax.jit, static_argnames="stage")
+def _on_blocks(stage: Stage, method: Any, parts: Parts, known: Known) -> Parts:
+    return stage.run(method, parts, known)
+
+
+@functools.partial(jax.jit, static_argnames=("stage", "names"))
+def _on_pixels(
+    stage: Stage,
+    method: Any,
+    frame: Frame,
+    names: tuple[str, ...],
+    scene: Scene,
+    parts: Parts,
+    known: Known,
+) -> Parts:
+    return stage.run(method, method.images(frame, names, scene) | parts, known)

@@ -1,0 +1,57 @@
+"""The methods by name. Nothing here imports JAX, so that a command line can list them at once.
+
+A method is a frozen dataclass, a pytree: its numbers are leaves, its options are static. It says
+- `name`, and `backends`, those that it runs on;
+- `for_frame(inputs, names)`: the method with what it takes from the frame's size filled in, or
+  `ValueError` for a frame that it cannot denoise (another set of guides, light of another size);
+- `images(frame, names, scene, smooth)`: what it reads of the pixels, and `margin`, how many pixels
+  those depend on beyond their own;
+- `known(images)`: what is known of the whole frame from a sparse grid of its pixels;
+- `stages()`: what it does (`jflnr.stages`).
+
+- `features`: the layers that it reads, if they are its own; else users choose guides.
+
+Drivers run any such method: whole, in tiles and over time. In place of stages, a method whose
+frames cannot be cut has `denoise(inputs, names)`, and one with a history of its own `start(frame)`
+and `step(state, frame)`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from typing import Any
+
+from jflnr import checks
+
+# Name to the module that has the method, its class, and options that the name stands for.
+HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "flr": ("jflnr.regression.flr", "FLR", {}),
+    "flr-adaptive": ("jflnr.regression.adaptive", "AdaptiveFLR", {}),
+    "flnr-tiny": ("jflnr.network.flnr", "FLNR", {"size": "tiny"}),
+    "flnr-small": ("jflnr.network.flnr", "FLNR", {"size": "small"}),
+    "flnr": ("jflnr.network.flnr", "FLNR", {}),
+    "bmfr": ("jflnr.bmfr.pipeline", "BMFR", {}),
+    "auto": ("jflnr.auto.method", "Auto", {}),
+}
+DEFAULT = "flr"
+METHODS = tuple(HOMES)
+BACKENDS = ("jax", "opencl")
+
+
+def method_of(method: Any = DEFAULT, **options: Any) -> Any:
+    """The method that is meant: one by name or an object, with some of its fields replaced.
+
+    Raises `ValueError` for a name that is none, `TypeError` for an option that it does not have.
+    """
+    if isinstance(method, str):
+        checks.choice("method", method, METHODS)
+        home, kind, meant = HOMES[method]
+        method = getattr(importlib.import_module(home), kind)(**meant)
+    fields = [field.name for field in dataclasses.fields(method) if field.init]
+    for option in options:
+        if option not in fields:
+            raise TypeError(
+                f"method {method.name} has no {option}; it has {', '.join(fields) or 'no options'}"
+            )
+    return dataclasses.replace(method, **options)

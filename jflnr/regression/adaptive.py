@@ -1,0 +1,359 @@
+"""FLR that adapts to the noise and to edges: weights, windows and widths from the data.
+
+Pass 1 over the pixels collects moments of the brightness; a first fit, the pilot, comes from them.
+Pass 2 weighs every pixel by the variance that the pilot predicts and collects the moments of all
+channels at fine blocks. Everything else happens on blocks: a pyramid of grids, on each the same
+edge-aware window, and from each finer grid as much of the difference to the coarser one as is
+signal. Pass 3 evaluates the models. docs/adaptive.md derives the steps.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jflnr.frame import Frame
+from jflnr.images.inputs import robust_images, same_size
+from jflnr.regression import energy
+from jflnr.regression.apply import apply, apply_rows, with_borders
+from jflnr.regression.arguments import check_options, check_regression
+from jflnr.regression.floor import with_own_light
+from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
+from jflnr.regression.moments import (
+    Guides,
+    centre,
+    channels_of,
+    collect,
+    index_xy,
+    magnitude,
+    planes,
+)
+from jflnr.regression.pyramid import halve
+from jflnr.regression.uncertainty import DETAIL, block_error
+from jflnr.regression.weighted_moments import collect_weighted
+from jflnr.regression.widths import Step, fit_levels, guide_features, merged_models
+from jflnr.regression.window import REACH
+from jflnr.stages import Known, Parts, Stage, regress
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class AdaptiveFLR:
+    """The method of docs/adaptive.md, and its fitted constants.
+
+    sigma: standard deviation of the window, in blocks of its level.
+    eps, eps_prime: regularisation where there is no noise (Appendix, Eq. 18).
+    noise_ridge: how much of the relative variance is added to both.
+    position_ridge: regularisation of the slope across the window, whose variance is about 1.
+    exponent, offset: a pixel weighs `1 / ((pilot / mean)^exponent + offset)`.
+    guide_scale: guides may differ inside a window by one over this.
+    brightness_scale: so may the logarithm of the brightness.
+    caution: factor on the noise that is expected in what a finer level adds.
+    slack: share by which the mean brightness may differ from the input's.
+    floor: least brightness of a pixel, relative to what its model gives the whole block.
+    block: side in pixels of the blocks of pass 1; the finest models have half of it. levels: number
+    of grids, each twice as coarse. keep_energy: give every frame exactly the mean brightness of its
+    input, instead of nearly. with_error: tell the standard error of the result too.
+
+    Raises `ValueError` for a number that is not positive.
+    """
+
+    name: ClassVar[str] = "flr-adaptive"
+    backends: ClassVar[tuple[str, ...]] = ("jax", "opencl")
+    # Occlusion is averaged over 3 x 3 pixels.
+    margin: ClassVar[int] = 1
+    images: ClassVar[Any] = staticmethod(robust_images)
+
+    sigma: jax.Array | float = 2.0
+    eps: jax.Array | float = 1e-4
+    eps_prime: jax.Array | float = 1e-4
+    noise_ridge: jax.Array | float = 0.07
+    position_ridge: jax.Array | float = 0.2
+    exponent: jax.Array | float = 1.0
+    offset: jax.Array | float = 0.2
+    guide_scale: jax.Array | float = 2.0
+    brightness_scale: jax.Array | float = 2.0
+    caution: jax.Array | float = 1.0
+    slack: jax.Array | float = 0.025
+    floor: jax.Array | float = 0.2
+    block: int = field(default=8, metadata={"static": True})
+    levels: int = field(default=4, metadata={"static": True})
+    keep_energy: bool = field(default=False, metadata={"static": True})
+    with_error: bool = field(default=False, metadata={"static": True})
+
+    def __post_init__(self) -> None:
+        check_options(self)
+
+    @property
+    def finest(self) -> int:
+        """Pixels on a side of the finest blocks."""
+        return max(self.block // 2, 1)
+
+    def for_frame(self, frame: Frame, names: tuple[str, ...]) -> AdaptiveFLR:
+        same_size(frame, self.name)
+        return self
+
+    def known(self, images: Parts) -> Known:
+        """What guides are measured from, and what the light is divided by."""
+        return {"shift": centre(images["guides"]), "unit": magnitude(images["target"])}
+
+    def stages(self) -> tuple[Stage, ...]:
+        side = self.finest
+        models = [("models", side), ("output", 2 * side)] + [("error", side)] * self.with_error
+        return (
+            *first_stages(side),
+            Stage(
+                fit_models,
+                tuple(models),
+                ("moments", "light"),
+                reach=reach_of(self.levels) * side,
+                align=side << (self.levels - 1),
+                totals=(("kept", 2 * side),),
+                learn=learn_rate,
+            ),
+            *last_stages(evaluate, side, tuple(name for name, _ in models), self),
+        )
+
+
+def first_stages(side: int) -> tuple[Stage, ...]:
+    """Passes 1 and 2, with the pilot between them. side: pixels of the finest blocks."""
+    return (
+        Stage(
+            collect_light,
+            (("light", 2 * side),),
+            pixels=True,
+            totals=(("counted", 2 * side),),
+            learn=learn_mean,
+        ),
+        Stage(
+            fit_pilot,
+            (("pilot", 4 * side),),
+            ("light",),
+            reach=REACH * 4 * side,
+            align=4 * side,
+        ),
+        Stage(collect_moments, (("moments", side),), ("pilot",), pixels=True, reach=4 * side),
+    )
+
+
+def last_stages(evaluate: Any, side: int, reads: tuple[str, ...], method: Any) -> tuple[Stage, ...]:
+    """Pass 3 by `evaluate`, and one more over its result if the brightness is to be kept."""
+    gives = (("image", 1), *([("error", 1)] if method.with_error else []))
+    image = Stage(evaluate, gives, reads, pixels=True, reach=2 * side)
+    if not method.keep_energy:
+        return (image,)
+    image = dataclasses.replace(image, totals=(("sums", 1),), learn=learn_kept)
+    return image, Stage(keep_energy, gives, tuple(name for name, _ in gives))
+
+
+def reach_of(levels: int) -> int:
+    """How many of its own blocks the finest fit looks beyond a block.
+
+    On every level `REACH` for its window, over fits that follow the coarser level; for the share of
+    signal as many of twice the size, with one for what is halved and one for what is interpolated.
+    """
+    reach = REACH
+    for _ in range(levels - 1):
+        reach = REACH + 2 * (REACH + 1) + 1 + 2 * (reach + 1)
+    return reach
+
+
+DEFAULT = AdaptiveFLR()
+
+
+def flr_adaptive(
+    target: jax.Array,
+    guides: Guides,
+    method: AdaptiveFLR = DEFAULT,
+    *,
+    weight: jax.Array | None = None,
+    **options: Any,
+) -> Any:
+    """Fit the guides to a noisy image, adapting to its noise and its edges.
+
+    Scales with `target`. Not linear in it, but the channels are treated alike: images of three
+    channels denoised together as light groups (C = 3, 6, ...) sum to the denoised sum.
+
+    target: `(H, W, C)`, the noisy radiance Y, not negative. guides: `(H, W, Q)`, X without the
+    constant, or several such arrays. method: constants and options; options: fields of it to
+    replace. weight: `(H, W)`, numbers or a boolean mask; 0 removes a pixel, as does any value that
+    is not finite.
+    Returns `(H, W, C)`; `with_error` also `(H, W, 1)`, the standard error of its brightness.
+
+    Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
+    """
+    method = dataclasses.replace(method, **options)
+    check_regression(target, guides, None, weight)
+    given = regress(method, {"target": target, "guides": guides, "weight": weight})
+    return (given["image"], given["error"]) if method.with_error else given["image"]
+
+
+class Pilot(NamedTuple):
+    """The first fit, of the brightness at blocks of 16 pixels (four of the finest).
+
+    coefficients: `(Q + 1, 1, h + 2, w)`, a row of blocks beyond each border. mean: brightness of
+    the frame.
+    """
+
+    coefficients: jax.Array
+    mean: jax.Array
+
+
+def collect_light(method: Any, parts: Parts, known: Known) -> Parts:
+    """Pass 1: unweighted moments of the brightness, on blocks of twice the finest."""
+    light = light_of(parts["target"], known["unit"])[..., None]
+    images = light, parts["guides"], known["shift"]
+    moments = collect(*images, 2 * method.finest, parts["weight"])
+    own = moments[index_xy(0, 0, known["shift"].size, 1)]
+    return {"light": moments, "counted": jnp.stack([moments[0], own])}
+
+
+def learn_mean(method: Any, known: Known, sums: Parts) -> Known:
+    """The frame's brightness, in the mean and in sum."""
+    count, light = sums["counted"]
+    return {"mean": mean_light(count, light), "wanted": light}
+
+
+def mean_light(count: jax.Array, light: jax.Array) -> jax.Array:
+    """Mean brightness of the usable pixels; 1 if there is no light, where any scale will do."""
+    mean = light / jnp.maximum(count, 1e-12)
+    return jnp.where(mean > 0, mean, 1)
+
+
+def fit_pilot(method: Any, parts: Parts, known: Known) -> Parts:
+    """Models of the brightness from the moments of pass 1, `(Q + 1, 1, h, w)`."""
+    light, shift = halve(parts["light"]), known["shift"]
+    grid = Grid(light, jnp.zeros_like(light[:1]), 4 * method.finest)
+    features = guide_features(grid, shift.size, method)
+    system = windowed(grid, features, shift, 1, known["mean"], method)
+    return {"pilot": fit_level(system, shift.size, 1).coefficients}
+
+
+def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
+    """Pass 2: moments of the weighted pixels on the finest blocks, and one plane of their noise."""
+    target, guides, shift = parts["target"], parts["guides"], known["shift"]
+    pilot = with_borders(parts["pilot"])
+    expected = apply_rows(pilot, guides, shift, 4 * method.finest)[..., 0]
+    light = light_of(target, known["unit"])
+    weights, squares = _weights(light, guides, expected, known["mean"], parts["weight"], method)
+    weighted = target, guides, shift, weights, squares, method.finest, known["unit"]
+    return {"moments": jnp.concatenate(collect_weighted(*weighted))}
+
+
+def grid_of(moments: jax.Array, block: int) -> Grid:
+    """What pass 2 collected, as the fits take it."""
+    return Grid(moments[:-1], moments[-1:], block)
+
+
+def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
+    """All levels: models `(Q + 2, C, h, w)`, the last row from `floor.with_own_light`; the
+    brightness that they give blocks twice as large; and, asked for, their error."""
+    grid = grid_of(parts["moments"], method.finest)
+    levels = fit_steps(method, grid, known)
+    given = merged_parts(*levels, parts["light"], grid, known)
+    if method.with_error:
+        given["error"] = block_error(*levels, known["shift"].size)
+    return given
+
+
+def fit_steps(method: Any, grid: Grid, known: Known) -> tuple[Fit, list[Step]]:
+    """The coarsest fit, and what each finer level adds."""
+    channels = channels_of(grid.moments, known["shift"].size)
+    return fit_levels(grid, known["shift"], channels, method.levels, known["mean"], method)
+
+
+def merged_parts(
+    coarsest: Fit, steps: list[Step], light: jax.Array, grid: Grid, known: Known
+) -> Parts:
+    """The models put together, their brightness, and what that sums up from."""
+    guides = known["shift"].size
+    models = merged_models(coarsest, steps)
+    output = energy.block_light(models, light, guides)
+    models = with_own_light(models, mean_guides(grid.moments, guides))
+    kept = jnp.stack([light[0] * output, light[0] * output**2])
+    return {"models": models, "output": output, "kept": kept}
+
+
+def learn_rate(method: Any, known: Known, sums: Parts) -> Known:
+    """How much brightness is given back."""
+    before, squares = sums["kept"]
+    return {"rate": energy.rate(known["wanted"], before, squares, method.slack)}
+
+
+def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
+    """Pass 3: the light of every pixel, `(H, W, C)`, and its error."""
+    models = energy.scale(parts["models"], parts["output"], known["rate"])
+    given = light_parts(method, models, parts, known)
+    if method.with_error:
+        own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
+        # The floor is there for its root's derivative, and for pixels that see no light.
+        error = jnp.sqrt(parts["error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
+        none = jnp.zeros((*parts["target"].shape[:2], 0), error.dtype)
+        shown = apply(error[None, None], none, known["shift"][:0], method.finest)
+        given["error"] = shown * known["unit"]
+    return given
+
+
+def light_parts(method: Any, models: jax.Array, parts: Parts, known: Known) -> Parts:
+    """The image of models `(Q + 2, C, h, w)`, and what is needed to keep the brightness."""
+    guides, shift, unit = parts["guides"], known["shift"], known["unit"]
+    image = apply(models, guides, shift, method.finest, method.floor) * unit
+    if not method.keep_energy:
+        return {"image": image}
+    light = light_of(parts["target"])
+    counts = jnp.isfinite(light)
+    if parts["weight"] is not None:
+        counts &= parts["weight"] > 0
+    both = jnp.stack([light / unit, light_of(image) / unit])
+    return {"image": image, "sums": jnp.where(counts, both, 0)}
+
+
+def learn_kept(method: Any, known: Known, sums: Parts) -> Known:
+    """What brings the brightness of the result to the input's, over the pixels that count."""
+    before, after = sums["sums"]
+    return {"share": jnp.where(after > 0, before / jnp.where(after > 0, after, 1), 1)}
+
+
+def keep_energy(method: Any, parts: Parts, known: Known) -> Parts:
+    """The result with the brightness of the input."""
+    return {name: parts[name] * known["share"] for name in ("image", "error") if name in parts}
+
+
+def light_of(target: jax.Array, unit: jax.Array | float = 1) -> jax.Array:
+    """Brightness of the pixels over `unit`, `(H, W, C)` to `(H, W)`."""
+    weights = brightness(target.shape[-1], target.dtype)
+    return sum(
+        (w * (plane / unit) for w, plane in zip(weights, planes(target), strict=True)),
+        jnp.zeros(target.shape[:2], target.dtype),
+    )
+
+
+def _weights(
+    light: jax.Array,
+    guides: Guides,
+    expected: jax.Array,
+    mean: jax.Array,
+    weight: jax.Array | None,
+    numbers: Any,
+) -> tuple[jax.Array, jax.Array]:
+    """Each pixel's weight from what the pilot expects, and the noise that leaves.
+
+    The variance of a pixel grows with its brightness, and the best weight is one over it.
+    light, expected: `(H, W)`.
+    Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
+    """
+    # The floor is there for the logarithm; written so, the power takes a quarter of the time.
+    relative = jnp.log(jnp.maximum(expected / mean, 1e-6))
+    weights = 1 / (jnp.exp(numbers.exponent * relative) + numbers.offset)
+    usable = jnp.isfinite(light)
+    for layer in jax.tree.leaves(guides):
+        usable &= jnp.all(jnp.isfinite(layer), axis=-1)
+    if weight is not None:
+        usable &= (weight > 0) & jnp.isfinite(weight)
+        weights *= weight
+    weights = jnp.where(usable, weights, 0)
+    return weights, jnp.where(usable, weights * (light - expected), 0) ** 2

@@ -1,0 +1,135 @@
+"""One level of the pyramid: local models at one window width, and how noisy they are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jflnr.regression.elimination import solve_strips
+from jflnr.regression.moments import index_xx, index_xy
+from jflnr.regression.window import Window, gather, gather_moments, window_over
+
+if TYPE_CHECKING:
+    from jflnr.regression.adaptive import AdaptiveFLR
+
+
+class Grid(NamedTuple):
+    """What is collected at one size of block.
+
+    moments: `(K, h, w)`, weighted. noise: `(1, h, w)`, mean of the squared weighted residuals of
+    the brightness. block: the block's side in pixels.
+    """
+
+    moments: jax.Array
+    noise: jax.Array
+    block: int
+
+
+class Fit(NamedTuple):
+    """The models of one level.
+
+    coefficients: `(Q + 1, C, h, w)`. variance: `(h, w)`, of the brightness they predict.
+    window: the window they were fitted under.
+    """
+
+    coefficients: jax.Array
+    variance: jax.Array
+    window: Window
+
+
+def brightness(channels: int, dtype: jnp.dtype) -> jax.Array:
+    """Weights `(C,)` of the channels in the brightness by which all of them are treated.
+
+    Luminance of linear sRGB for colours, or for several light groups of three channels, whose sum
+    counts; else the sum.
+    """
+    luminance = (0.2126, 0.7152, 0.0722)
+    weights = luminance * (channels // 3) if channels % 3 == 0 else (1,) * channels
+    return jnp.asarray(weights, dtype)
+
+
+def mean_guides(moments: jax.Array, guides: int) -> jax.Array:
+    """Each block's mean of [1, X - shift], `(Q + 1, h, w)`; [1, 0, ...] where it is empty."""
+    n = moments[:1]
+    planes = moments[np.array([index_xx(i, 0) for i in range(guides + 1)])]
+    mean = planes * jnp.where(n > 1e-12, 1 / jnp.where(n > 1e-12, n, 1), 0)
+    return mean.at[0].set(1)
+
+
+def predict(coefficients: jax.Array, regressors: jax.Array) -> jax.Array:
+    """Brightness of the models at one point per block.
+
+    coefficients: `(Q + 1, C, h, w)`. regressors: `(Q + 1, h, w)`. Returns `(h, w)`.
+    """
+    weights = brightness(coefficients.shape[1], coefficients.dtype)
+    return jnp.einsum("qchw,qhw,c->hw", coefficients, regressors, weights)
+
+
+class Windowed(NamedTuple):
+    """A grid under its windows, ready to be solved.
+
+    moments: `(K, h, w)`, of Q guides and, with slopes, of the position. shift: of these guides.
+    eps, eps_prime: `(h, w)`, regularisation. variance: `(h, w)`, of the mean brightness.
+    """
+
+    moments: jax.Array
+    shift: jax.Array
+    eps: jax.Array
+    eps_prime: jax.Array
+    variance: jax.Array
+    window: Window
+
+
+def fit_level(system: Windowed, guides: int, channels: int) -> Fit:
+    """The models of one level, of the guides alone, from `windowed`."""
+    regular = system.eps, system.eps_prime
+    coefficients = solve_strips(system.moments, system.shift, *regular, channels)
+    return Fit(coefficients[: guides + 1], system.variance, system.window)
+
+
+def windowed(
+    grid: Grid,
+    features: jax.Array,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveFLR,
+    *,
+    slopes: bool = True,
+    wider: jax.Array | float = 1.0,
+) -> Windowed:
+    """The normal equations of one level.
+
+    The variance of a weighted mean, sum(w^2 r^2) / sum(w)^2 with residuals r, tells how noisy the
+    window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
+
+    features: `(F, h, w)`, what must be alike in a window. mean: brightness of the whole frame.
+    slopes: whether the position in the window is a guide too. wider: `(h, w)`, factor on the width
+    of each block's window.
+    """
+    guides, positions = shift.size, 2 if slopes else 0
+    window = window_over(features, numbers.sigma * wider)
+    moments = (
+        gather_moments(grid.moments, window, numbers.sigma, guides, channels)
+        if slopes
+        else gather(grid.moments, window)
+    )
+    n = jnp.maximum(moments[0], 1e-12)
+    # The square of n and, in derivatives, the square of that would be too small for float32.
+    inverse = 1 / (n * grid.block)
+    variance = gather(grid.noise, window.squared())[0] * inverse * inverse
+    start = index_xy(0, 0, guides + positions, channels)
+    colour = moments[start : start + channels] / n
+    level = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
+    relative = variance / (jnp.maximum(level, 0) ** 2 + 0.01 * mean**2)
+    ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
+
+    # Positions are centred on the window already, so only their own ridge is added.
+    for i in range(guides + 1, guides + 1 + positions):
+        moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
+    centred = jnp.concatenate([shift, jnp.zeros(positions, shift.dtype)])
+    eps, eps_prime = numbers.eps + ridge, numbers.eps_prime + ridge
+    return Windowed(moments, centred, eps, eps_prime, variance, window)

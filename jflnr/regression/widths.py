@@ -1,0 +1,121 @@
+"""Widths from the data: a fit on every grid, and of each finer one as much as is signal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.merge import interpolate, signal_share
+from jflnr.regression.pyramid import double, halve
+
+if TYPE_CHECKING:
+    from jflnr.regression.adaptive import AdaptiveFLR
+
+
+class Said(NamedTuple):
+    """What a network says of the windows of one grid.
+
+    alike: `(E, h, w)`, added to what must be alike in a window, which is no more than E planes.
+    wider: `(h, w)`, factor on the width of each block's window.
+    """
+
+    alike: jax.Array
+    wider: jax.Array
+
+
+class Step(NamedTuple):
+    """One level finer than what was known before.
+
+    fine: its fit. coarse: that of the coarser level, on this grid. level: `(h, w)`, brightness
+    known before. share: `(h, w)`, how much of their difference is signal. merged: models
+    `(Q + 1, C, h, w)` with that share added.
+    """
+
+    grid: Grid
+    fine: Fit
+    coarse: Fit
+    level: jax.Array
+    share: jax.Array
+    merged: jax.Array
+
+
+def merged_models(coarsest: Fit, steps: list[Step]) -> jax.Array:
+    """Models of the finest grid, put together from all levels: `(Q + 1, C, h, w)`."""
+    return steps[-1].merged if steps else coarsest.coefficients
+
+
+def fit_levels(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    levels: int,
+    mean: jax.Array,
+    numbers: AdaptiveFLR,
+    said: Sequence[Said] | None = None,
+) -> tuple[Fit, list[Step]]:
+    """The fit of the coarsest grid, and the steps from there to the finest.
+
+    said: of every grid, from the finest to the coarsest; None without a network.
+    """
+    grids = [grid]
+    for _ in range(levels - 1):
+        last = grids[-1]
+        grids.append(Grid(halve(last.moments), halve(last.noise), 2 * last.block))
+    heard = list(said) if said is not None else [None] * levels
+    features = guide_features(grids[-1], shift.size, numbers)
+    features, wider = _with(heard[-1], features)
+    system = windowed(grids[-1], features, shift, channels, mean, numbers, wider=wider)
+    coarsest = coarse = fit_level(system, shift.size, channels)
+    merged, steps = coarse.coefficients, list[Step]()
+    for grid, own in zip(reversed(grids[:-1]), reversed(heard[:-1]), strict=True):
+        # Windows of the finest blocks are so narrow that slopes across them are hardly worth
+        # their time.
+        slopes = grid is not grids[0]
+        steps.append(_refine(grid, coarse, merged, shift, channels, mean, numbers, slopes, own))
+        coarse, merged = steps[-1].fine, steps[-1].merged
+    return coarsest, steps
+
+
+def _refine(
+    grid: Grid,
+    coarse: Fit,
+    merged: jax.Array,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveFLR,
+    slopes: bool,
+    said: Said | None,
+) -> Step:
+    """One level finer: its own fit, and what is merged so far with its share added."""
+    size = grid.moments.shape[1:]
+    window = coarse.window
+    coarse, merged = interpolate(coarse, *size), double(merged, *size)
+    level = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
+    # Windows end where what is known so far of the brightness changes.
+    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
+    features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
+    features, wider = _with(said, features)
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes, wider=wider)
+    fine = fit_level(system, shift.size, channels)
+    reference = level**2 + 0.01 * mean**2
+    share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
+    merged = merged + share * (fine.coefficients - coarse.coefficients)
+    return Step(grid, fine, coarse, level, share, merged)
+
+
+def _with(said: Said | None, features: jax.Array) -> tuple[jax.Array, jax.Array | float]:
+    """What must be alike, `(F, h, w)`, and the factor on the width."""
+    if said is None:
+        return features, 1.0
+    more = [(0, len(said.alike) - len(features)), (0, 0), (0, 0)]
+    return said.alike + jnp.pad(features, more), said.wider
+
+
+def guide_features(grid: Grid, guides: int, numbers: AdaptiveFLR) -> jax.Array:
+    """What of the guides must be alike inside a window, `(Q, h, w)`."""
+    return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
