@@ -16,11 +16,12 @@ import jflnr
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, sentence
 from jflnr.cli.content import (
+    Pixels,
     about_of,
-    not_finite_pixels,
     picture_of,
     split,
     spp_of,
+    warnings_of,
     with_direct,
 )
 from jflnr.cli.jobs import Job, make_folder
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 Record = dict[str, Any]
 # Denoised light, and its standard error if that was asked for.
 Light = tuple[np.ndarray, np.ndarray | None]
-
-DIRECT = "Direct light is left as it was rendered; --direct denoises it too."
 
 
 class Loaded(NamedTuple):
@@ -164,8 +163,8 @@ class Worker:
             self.compiled.add(shapes)
         about = about_of(frame, settings, spp_of(source, arguments))
         lights = split(light)
-        # Our own files hold converged direct light; other programs' is as noisy as the rest.
-        left = about["spp"] is None and frame.direct is not None and not arguments.direct
+        pixels = Pixels()
+        pixels.add(frame)
         record = {
             "width": light.shape[1],
             "height": light.shape[0],
@@ -174,11 +173,7 @@ class Worker:
             **about,
             "seconds": times[-1] - times[-2],
             "compile_seconds": times[-2] - times[0],
-            "warnings": [
-                *{str(warning.message): None for warning in caught},
-                *not_finite_pixels(frame),
-                *([DIRECT] if left else []),
-            ],
+            "warnings": warnings_of(caught, pixels, about, frame, arguments),
         }
         if arguments.profile:
             from jflnr.opencl.context import default_context
