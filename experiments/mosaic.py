@@ -9,7 +9,7 @@ import numpy as np
 
 import jflnr
 from experiments import data
-from jflnr.large.scanlines import writing
+from jflnr import exr
 from jflnr.layouts.channels import LAYERS
 
 PARTS = ("indirect", "albedo", "normal", "depth", "ao", "mask")
@@ -26,7 +26,7 @@ def write(path: Path, height: int, width: int, first: int = 0) -> None:
     frames = data.frames("train", "val", "test")
     rows, columns, _ = layers(frames[0]).shape
     channels = [channel for group in names().values() for channel in group]
-    with writing(path, (height, width), channels, kind="half") as append:
+    with exr.writing_rows(path, (height, width), dict.fromkeys(channels, np.float16)) as append:
         for band, top in enumerate(range(0, height, rows)):
             strip = strip_of(frames, band, -(-width // columns), first)[: height - top, :width]
             append({name: strip[..., i] for i, name in enumerate(channels)})

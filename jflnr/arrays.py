@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jflnr.files import replacing
+from jflnr.files import json_object, replacing, unpacked_size
 
 HEADER = "header"
 
@@ -36,16 +35,11 @@ def read(
     """
     path = Path(path)
     try:
-        with path.open("rb") as file:
-            with zipfile.ZipFile(file) as archive:
-                size = sum(entry.file_size for entry in archive.infolist())
-            if size <= (path.stat().st_size if largest is None else largest):
-                file.seek(0)
-                with np.load(file, allow_pickle=False) as stored:
-                    arrays = {name: stored[name] for name in stored.files}
-                header = json.loads(arrays.pop(HEADER).tobytes())
-                if isinstance(header, dict):
-                    return header, arrays
+        if unpacked_size(path) <= (path.stat().st_size if largest is None else largest):
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            if header := json_object(arrays.pop(HEADER).tobytes()):
+                return header, arrays
     except FileNotFoundError:
         raise ValueError(f"{path}: there is no such file; it should be {wanted}") from None
     except Exception:  # damaged archives fail in many ways, some undocumented

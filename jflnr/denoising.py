@@ -23,6 +23,29 @@ if TYPE_CHECKING:
 SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 
 
+def _own_settings(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function in float32, with the promotions it was written for, whatever JAX is told."""
+
+    @functools.wraps(function)
+    def wrapped(*given: Any, **named: Any) -> Any:
+        rank, kind = jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard")
+        with jax.enable_x64(False), rank, kind:
+            return function(*given, **named)
+
+    return wrapped
+
+
+def _native(frame: Frame) -> Frame:
+    """The frame with arrays of numpy in float32 or half, in the order of bytes of this machine."""
+
+    def native(layer: Array) -> Array:
+        if not isinstance(layer, np.ndarray) or layer.dtype.kind != "f":
+            return layer
+        return layer.astype(np.float16 if layer.dtype.itemsize == 2 else np.float32, copy=False)
+
+    return jax.tree.map(native, frame)
+
+
 def denoise(
     frame: Frame,
     method: Any = DEFAULT,
@@ -91,8 +114,10 @@ class Denoiser:
                 raise ValueError(f"method {self.method.name} does not work in tiles")
         self.tile, self.state, self._device = tile, None, device
 
+    @_own_settings
     def __call__(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise a frame by itself; its light is written to `out`, if given, and returned."""
+        frame = _native(frame)
         names, inputs = prepare(frame, self.guides, self.method)
         method = self.method.for_frame(inputs, names)
         if hasattr(method, "step"):
@@ -107,11 +132,13 @@ class Denoiser:
         light = self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
         return light if out is not None else _given({"image": light}, frame, None)
 
+    @_own_settings
     def next(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise the next frame of a shot, with what those before it left (docs/temporal.md).
 
         frame: with `motion`. `state` is what is left to the next one; None begins another shot.
         """
+        frame = _native(frame)
         state = self.start(frame) if self.state is None else self.state
         self.state, light = self._step(state, frame)
         return _given({"image": light}, frame, out)

@@ -6,11 +6,13 @@ Whatever is wrong with a file is raised as OSError or ValueError, in one sentenc
 """
 
 import contextlib
+import errno
 import io
 import os
 import struct
+import tempfile
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +26,7 @@ PathLike = str | os.PathLike[str]
 COMPONENTS = "RGBAXYZ"
 TYPES = {"float16": "half", "float32": "float", "uint32": "uint"}
 MAGIC = b"\x76\x2f\x31\x01"
+DATA_WINDOW = b"dataWindow\0box2i\0\x10\0\0\0"  # what comes before its four numbers
 # Attributes that say how the pixels are stored; `comments` is told apart from the others.
 STRUCTURE = (
     *("channels", "chunkCount", "comments", "compression", "dataWindow", "displayWindow"),
@@ -32,6 +35,8 @@ STRUCTURE = (
 # A small damaged header can announce any size. No real frame packs better than this.
 ALWAYS_ALLOWED_BYTES = 1 << 30
 PACKED_AT_MOST = 1000
+# Texts of a header that are not UTF-8.
+MOST_TEXTS = 100
 
 
 class Window(NamedTuple):
@@ -105,6 +110,17 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
     return channels
 
 
+def check_aligned(*paths: PathLike) -> None:
+    """Raise ValueError unless the pixels of all files are those of the same data window."""
+    (first, origin), *others = [(path, read_attributes(path).window.origin) for path in paths]
+    for other, start in others:
+        if start != origin:
+            raise ValueError(
+                f"{first} starts at pixel {origin} and {other} at {start}: "
+                "they do not cover the same pixels"
+            )
+
+
 def write_channels(
     path: PathLike,
     channels: Mapping[str, np.ndarray],
@@ -122,24 +138,89 @@ def write_channels(
     check_sizes(path, channels)
     if wrong := [f"{n} is {a.dtype}" for n, a in channels.items() if a.dtype.name not in TYPES]:
         raise TypeError(f"channels must be {', '.join(TYPES)}; {wrong[0]}")
-    height, width = next(iter(channels.values())).shape
-    (x, y), display = window or Window()
-    corners = (x, y, x + width - 1, y + height - 1)
+    size = next(iter(channels.values())).shape
     computed = all(pixels.dtype == np.float32 for pixels in channels.values())
+    compression = OpenEXR.NO_COMPRESSION if computed else OpenEXR.ZIP_COMPRESSION
+    header = _header(size, comments, window, others) | {"compression": compression}
+    with replacing(path) as beside:
+        _write(beside, header, channels)
+
+
+@contextlib.contextmanager
+def writing_rows(
+    path: PathLike,
+    size: tuple[int, int],
+    types: Mapping[str, Any],
+    comments: str | None = None,
+    window: Window | None = None,
+    others: Mapping[str, Any] | None = None,
+) -> Iterator[Callable[[Mapping[str, np.ndarray]], None]]:
+    """A function that appends rows to a file of height and width `size`, which is there at the end.
+
+    types: the dtype of each channel; all else as for `write_channels`, without compression.
+    """
+    names, width = sorted(types, key=str.encode), size[1]
+    pixels = np.dtype([(name, np.dtype(types[name]).newbyteorder("<"), width) for name in names])
+    row = np.dtype([("y", "<i4"), ("bytes", "<i4"), ("pixels", pixels)])
+    header = _header(size, comments, window, others) | {"compression": OpenEXR.NO_COMPRESSION}
+    y = (window or Window()).origin[1]
+    with replacing(Path(path)) as beside, beside.open("wb") as file:
+        start = _header_bytes(header, types)
+        table = len(start) + 8 * size[0] + row.itemsize * np.arange(size[0])
+        file.write(start + table.astype("<u8").tobytes())
+
+        def append(channels: Mapping[str, np.ndarray]) -> None:
+            nonlocal y
+            rows = np.empty(len(channels[names[0]]), row)
+            rows["y"], rows["bytes"] = y + np.arange(len(rows)), pixels.itemsize
+            for name in names:
+                rows["pixels"][name] = channels[name]
+            file.write(rows.tobytes())
+            y += len(rows)
+
+        yield append
+
+
+def _header(
+    size: tuple[int, ...],
+    comments: str | None,
+    window: Window | None,
+    others: Mapping[str, Any] | None,
+) -> dict[str, Any]:
+    """The header of an image of height and width `size`, but for its compression."""
+    (x, y), display = window or Window()
+    corners = (x, y, x + size[1] - 1, y + size[0] - 1)
     header = dict(others or {}) | {
-        "compression": OpenEXR.NO_COMPRESSION if computed else OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "dataWindow": _box(corners),
         "displayWindow": _box(display or corners),
     }
-    if comments is not None:
-        header["comments"] = comments
+    return header if comments is None else header | {"comments": comments}
+
+
+def _header_bytes(header: dict[str, Any], types: Mapping[str, Any]) -> bytes:
+    """What a file without compression starts with: that of one pixel, with the whole data window.
+
+    Behind it that has an offset, the row's number and size, and the pixel.
+    """
+    pixel = {name: np.zeros((1, 1), dtype) for name, dtype in types.items()}
+    low, high = header["dataWindow"]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pixel.exr"
+        _write(path, header | {"dataWindow": (low, low)}, pixel)
+        start = path.read_bytes()[: -16 - sum(value.itemsize for value in pixel.values())]
+    return start.replace(
+        DATA_WINDOW + low.tobytes() * 2, DATA_WINDOW + low.tobytes() + high.tobytes()
+    )
+
+
+def _write(path: Path, header: dict[str, Any], channels: Mapping[str, np.ndarray]) -> None:
     contiguous = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
     try:
-        with replacing(path) as beside, _silence():
-            OpenEXR.File(header, contiguous).write(str(beside))
-    except (OSError, RuntimeError) as error:  # OpenEXR raises RuntimeError when the disk is full
-        raise OSError(f"{path} cannot be written: {getattr(error, 'strerror', error)}") from None
+        with _silence():
+            OpenEXR.File(header, contiguous).write(os.fsencode(path))
+    except RuntimeError as error:  # 'Cannot open image file "...". No space left on device.'
+        raise OSError(errno.EIO, str(error).rpartition('". ')[2].rstrip(".")) from None
 
 
 class _Part(NamedTuple):
@@ -153,17 +234,45 @@ def _read_parts(path: Path, header_only: bool) -> list[_Part]:
     _check_file(path)
     with _silence():
         try:
-            file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+            file, texts = _open(path, separate_channels=True, header_only=header_only)
             return [
                 _Part(
                     part.name(),
-                    file.header(index),
+                    {n: texts.get(v, v) if isinstance(v, str) else v for n, v in header.items()},
                     {channel.name: channel.pixels for channel in part.channels.values()},
                 )
-                for index, part in enumerate(file.parts)
+                for part, header in zip(
+                    file.parts, map(file.header, range(len(file.parts))), strict=True
+                )
             ]
         except Exception as error:  # RuntimeError, UnicodeDecodeError, TypeError, MemoryError, ...
             raise ValueError(_why_unreadable(path)) from error
+
+
+def _open(path: Path, **options: bool) -> tuple[Any, dict[str, str]]:
+    """The file, and those texts of its header that are not UTF-8, taken as Latin-1.
+
+    OpenEXR opens no such file. In the copy that it gets, letters beyond ASCII are question marks;
+    the texts are by what they are there.
+    """
+    texts: dict[str, str] = {}
+    try:
+        return OpenEXR.File(os.fsencode(path), **options), texts
+    except UnicodeDecodeError:
+        data = path.read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "copy.exr"
+        while True:
+            copy.write_bytes(data)
+            try:
+                return OpenEXR.File(os.fsencode(copy), **options), texts
+            except UnicodeDecodeError as error:
+                plain = bytes(byte if byte < 128 else ord("?") for byte in error.object)
+                texts[plain.decode()] = error.object.decode("latin-1")
+                length = struct.pack("<i", len(plain))
+                before, data = data, data.replace(length + error.object, length + plain)
+                if data == before or len(texts) > MOST_TEXTS:
+                    raise
 
 
 def _check_file(path: Path) -> None:
@@ -171,6 +280,8 @@ def _check_file(path: Path) -> None:
         raise FileNotFoundError(f"{path}: there is no such file")
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a folder, not an EXR file")
+    if not path.is_file():
+        raise OSError(f"{path} is a pipe or a device, not an EXR file")
     try:
         with path.open("rb") as file:
             start = file.read(len(MAGIC))
@@ -184,8 +295,7 @@ def _check_file(path: Path) -> None:
 
 def _why_unreadable(path: Path) -> str:
     """OpenEXR only says that it could not open the file. The usual reasons can be told apart."""
-    key = b"dataWindow\0box2i\0\x10\0\0\0"
-    _, found, after = path.read_bytes()[: 1 << 16].partition(key)
+    _, found, after = path.read_bytes()[: 1 << 16].partition(DATA_WINDOW)
     if found and len(after) >= 16:
         x0, y0, x1, y1 = struct.unpack("<4i", after[:16])
         if x1 < x0 or y1 < y0:

@@ -12,6 +12,7 @@ import jax
 import numpy as np
 
 from jflnr import checks, exr, layouts
+from jflnr.files import json_object
 
 Array: TypeAlias = np.ndarray | jax.Array
 
@@ -60,7 +61,7 @@ def frame_of(source: layouts.Source) -> Frame:
 
 def read_header(path: exr.PathLike) -> dict:
     """The JSON object in the header's `comments` (scene, camera, ...); {} if there is none."""
-    return layouts.parse_header(exr.read_attributes(path).comments)
+    return json_object(exr.read_attributes(path).comments)
 
 
 def write_frame(path: exr.PathLike, frame: Frame, spp: int = 1, header: dict | None = None) -> None:
@@ -80,11 +81,16 @@ def write_frame(path: exr.PathLike, frame: Frame, spp: int = 1, header: dict | N
 
 
 def composite(frame: Frame, indirect: Array) -> Array:
-    """The picture `albedo * (direct + indirect) + emission`, (H, W, 3); an absent layer is 0."""
+    """The picture `albedo * (direct + indirect) + emission`, (H, W, 3); an absent layer is 0.
+
+    Where albedo is NaN or infinite it is `emission`, which for other programs is all of it.
+    """
     checks.image("indirect", indirect, 3)
     checks.same_size(albedo=frame.albedo, indirect=indirect)
     light = indirect if frame.direct is None else frame.direct + indirect
-    picture = frame.albedo * light
+    jnp = np if isinstance(frame.albedo, np.ndarray) else jax.numpy
+    known = jnp.isfinite(frame.albedo).all(axis=-1, keepdims=True) & (frame.albedo != 0)
+    picture = jnp.where(known, frame.albedo * light, 0)
     return picture if frame.emission is None else picture + frame.emission
 
 

@@ -12,6 +12,8 @@ from jflnr import arrays
 
 FORMAT = "jflnr history"
 WANTED = "a history that --history wrote"
+# What a file says besides the arrays.
+ABOUT = {"options": dict, "last": list, "header": dict}
 
 
 class History(NamedTuple):
@@ -37,10 +39,13 @@ class History(NamedTuple):
 
 def read(path: Path) -> History:
     """The history in a file. Raises `ValueError` if it is no such file."""
-    header, stored = arrays.read(path, WANTED)
-    if header.get("format") != FORMAT or not isinstance(header.get("about"), dict):
+    head, stored = arrays.read(path, WANTED)
+    about = head.get("about")
+    if head.get("format") != FORMAT or not isinstance(about, dict):
         raise ValueError(f"{path}: not {WANTED}")
-    return History(path, header["about"], stored)
+    if not all(isinstance(about.get(name), kind) for name, kind in ABOUT.items()):
+        raise ValueError(f"{path} does not say what history it is: {', '.join(ABOUT)} are wanted")
+    return History(path, about, stored)
 
 
 def write(path: Path, state: Any, about: Mapping[str, Any]) -> None:

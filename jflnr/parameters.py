@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from jflnr import checks
 from jflnr.files import write_atomically
 from jflnr.methods import method_of
 
@@ -43,10 +44,22 @@ def load_parameters(path: str | Path) -> tuple[Any, dict[str, Any]]:
     if name not in METHODS:
         raise ValueError(f"{path}: its method is {name!r}; it should be {' or '.join(METHODS)}")
     names = list(numbers_of(method_of(name)))
-    try:
-        values = {number: float(text[number]) for number in names}
-    except (KeyError, TypeError, ValueError, OverflowError):
+    if not all(type(text.get(number)) in (int, float) for number in names):
         raise ValueError(
             f"{path}: {', '.join(names)} must all be there as numbers; it should be {wanted}"
-        ) from None
-    return method_of(name, **values), text
+        )
+    try:
+        _check_use(text)
+        return method_of(name, **{number: float(text[number]) for number in names}), text
+    except (ValueError, TypeError, OverflowError) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _check_use(about: dict[str, Any]) -> None:
+    """Raise unless the guides and the block that a file names, if it does, are such."""
+    from jflnr.images.guides import NAMES
+
+    guides = about.get("guides", [])
+    if not isinstance(guides, list) or not all(guide in NAMES for guide in guides):
+        raise ValueError(f"guides must be a list of names out of {', '.join(NAMES)}; got {guides}")
+    checks.positive_integer("block", about.get("block", 1))

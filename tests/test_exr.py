@@ -1,5 +1,6 @@
 """EXR files: what is written is read back, and every unusable file gives one clear sentence."""
 
+import os
 import re
 import struct
 from pathlib import Path
@@ -188,8 +189,8 @@ def test_a_failed_write_leaves_the_old_file(file: Path, monkeypatch: pytest.Monk
     class Interrupted:
         def __init__(self, *_: object) -> None: ...
 
-        def write(self, path: str) -> None:
-            Path(path).write_bytes(before[:50])
+        def write(self, path: bytes) -> None:
+            Path(os.fsdecode(path)).write_bytes(before[:50])
             raise KeyboardInterrupt
 
     monkeypatch.setattr(OpenEXR, "File", Interrupted)
@@ -228,3 +229,36 @@ def with_data_window(file: bytes, window: tuple[int, int, int, int]) -> bytes:
     key = b"dataWindow\0box2i\0\x10\0\0\0"
     start = file.index(key) + len(key)
     return file[:start] + struct.pack("<4i", *window) + file[start + 16 :]
+
+
+def test_rows_make_the_file_that_the_whole_does(tmp_path: Path, rng: np.random.Generator) -> None:
+    """To the byte, whatever the header holds; also where they begin in another data window."""
+    names = ("depth.Z", "R", "G", "B", "a.B", "Z")
+    image = {name: rng.random((30, 8), np.float32) for name in names}
+    about = '{"a": 1}', exr.Window((-3, 17), (0, 0, 99, 99)), {"artist": "é", "gain": 2.5}
+    exr.write_channels(tmp_path / "a.exr", image, *about)
+    types = dict.fromkeys(image, np.float32)
+    with exr.writing_rows(tmp_path / "b.exr", (30, 8), types, *about) as append:
+        for start, stop in ((0, 13), (13, 14), (14, 30)):
+            append({name: pixels[start:stop] for name, pixels in image.items()})
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+
+
+def test_rows_of_several_types(tmp_path: Path, rng: np.random.Generator) -> None:
+    image = {"a": rng.random((4, 5)).astype(np.float16), "b": rng.random((4, 5), np.float32)}
+    image["c"] = rng.integers(0, 9, (4, 5), np.uint32)
+    types = {name: pixels.dtype for name, pixels in image.items()}
+    with exr.writing_rows(tmp_path / "a.exr", (4, 5), types) as append:
+        append(image)
+    for name, pixels in exr.read_channels(tmp_path / "a.exr").items():
+        np.testing.assert_array_equal(pixels, image[name], strict=True)
+
+
+def test_rows_that_are_interrupted_leave_nothing(tmp_path: Path) -> None:
+    with (
+        pytest.raises(KeyboardInterrupt),
+        exr.writing_rows(tmp_path / "a.exr", (4, 4), {"R": np.float32}) as append,
+    ):
+        append({"R": np.zeros((2, 4), np.float32)})
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())

@@ -6,6 +6,7 @@ import numerical code inside the functions that run it, so that `--help` and `in
 
 import argparse
 import contextlib
+import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -34,6 +35,9 @@ COMMANDS = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line (default: the process's own) and return its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # letters that a terminal lacks, by number
+            stream.reconfigure(errors="backslashreplace")
     arguments = parser().parse_args(argv)
     try:
         with _silence() if getattr(arguments, "quiet", False) else contextlib.nullcontext():
@@ -43,12 +47,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("jflnr: interrupted; no partial file is left", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # `jflnr info ... | head`; Python would complain again while exiting
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # `jflnr info ... | head`
+        _drop_output()
         return 0
     except INPUT_ERRORS as error:
         print(f"{tinted('jflnr:', 'red', sys.stderr)} {sentence(error)}", file=sys.stderr)
+        _drop_output()
         return 2
+
+
+def _drop_output() -> None:
+    """Say what is left if that can be done; Python would complain of it once more while exiting."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager

@@ -18,7 +18,8 @@ COLOURS = {"red": 31, "yellow": 33}
 def sentence(error: BaseException) -> str:
     """The message of an input error, as one line."""
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror.lower()}"
+        named = "" if error.filename is None else f"{error.filename}: "
+        return f"{named}{error.strerror.lower()}"
     return " ".join(str(error).split()) or type(error).__name__
 
 
@@ -28,7 +29,7 @@ def voices() -> Iterator[tuple[TextIO, TextIO]]:
     if sys.stderr is not sys.__stderr__:
         yield sys.stdout, sys.stderr
         return
-    with open(os.dup(2), "w", buffering=1) as err:
+    with open(os.dup(2), "w", buffering=1, errors="backslashreplace") as err:
         yield sys.stdout, err
 
 

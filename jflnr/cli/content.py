@@ -2,6 +2,8 @@
 
 import argparse
 import dataclasses
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,10 +59,37 @@ def about_of(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[
     }
 
 
-def not_finite_pixels(frame: "Frame") -> list[str]:
-    from jflnr.frame import not_finite
+@dataclasses.dataclass
+class Pixels:
+    """What is counted of the pixels of a frame, whole or strip by strip."""
 
-    if not (counts := not_finite(frame)):
-        return []
-    listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
-    return [f"pixels that are NaN or infinite (the fit leaves them out): {listed}"]
+    not_finite: Counter[str] = dataclasses.field(default_factory=Counter)
+    denoised: int = 0
+    why: str = ""
+
+    def add(self, frame: "Frame") -> None:
+        from jflnr.frame import not_finite
+
+        self.not_finite.update(not_finite(frame))
+        count, why = layouts.denoised(vars(frame))
+        self.denoised, self.why = self.denoised + count, self.why or why
+
+
+def warnings_of(
+    caught: Iterable[Any],
+    pixels: Pixels,
+    about: dict[str, Any],
+    frame: "Frame",
+    arguments: argparse.Namespace,
+) -> list[str]:
+    """What a user should know of a frame that was denoised. caught: what Python was warned of."""
+    said = list(dict.fromkeys(str(warning.message) for warning in caught))
+    if counts := pixels.not_finite:
+        listed = ", ".join(f"{count} of {layer}" for layer, count in counts.items())
+        said.append(f"pixels that are NaN or infinite (the fit leaves them out): {listed}")
+    if not pixels.denoised:
+        said.append(pixels.why)
+    # Our own files hold converged direct light; other programs' is as noisy as the rest.
+    if about["spp"] is None and frame.direct is not None and not arguments.direct:
+        said.append("Direct light is left as it was rendered; --direct denoises it too.")
+    return said

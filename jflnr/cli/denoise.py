@@ -22,7 +22,7 @@ from jflnr import layouts
 from jflnr.cli import shots
 from jflnr.cli.common import add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
-from jflnr.cli.jobs import Job, plan
+from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import remarks, summary, throughput
@@ -106,6 +106,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.error_map and (arguments.method, arguments.backend) != ("flr-adaptive", "jax"):
         raise ValueError("--error-map needs --method flr-adaptive on the jax backend")
     jobs = plan(arguments.inputs, arguments.output)
+    outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
+    check_apart([arguments.history], [*outputs, *(job.source for job in jobs)])
+    check_apart([*outputs, arguments.history], [arguments.params])
     bound = memory.parse(arguments.memory) if arguments.memory else None
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()

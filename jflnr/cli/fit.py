@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jflnr.cli.common import guide_names
-from jflnr.cli.jobs import expand, make_folder
+from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
@@ -50,10 +50,12 @@ def run(arguments: argparse.Namespace) -> int:
     from jflnr.methods import method_of
     from jflnr.parameters import numbers_of, save_parameters
 
+    files = expand(arguments.frames)
+    check_apart([arguments.output], files)
     if arguments.output.exists() and not arguments.overwrite:
         print(f"{arguments.output} kept as it is; --overwrite replaces it")
         return 0
-    frames = [_read(file, spp) for file in expand(arguments.frames) for spp in arguments.spp]
+    frames = [_read(file, spp) for file in files for spp in arguments.spp]
     guides = choose(frames[0], arguments.guides)
     method = method_of(arguments.method)
     if arguments.block is not None:

@@ -16,11 +16,12 @@ import jflnr
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, sentence
 from jflnr.cli.content import (
+    Pixels,
     about_of,
-    not_finite_pixels,
     picture_of,
     split,
     spp_of,
+    warnings_of,
     with_direct,
 )
 from jflnr.cli.jobs import Job, make_folder
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 Record = dict[str, Any]
 # Denoised light, and its standard error if that was asked for.
 Light = tuple[np.ndarray, np.ndarray | None]
-
-DIRECT = "Direct light is left as it was rendered; --direct denoises it too."
 
 
 class Loaded(NamedTuple):
@@ -89,13 +88,12 @@ class Worker:
         return self.kept(job) or self.load(job)
 
     def kept(self, job: Job) -> Record | None:
-        """The record of a frame whose output is there and stays."""
+        """The record of a frame of which all is there that was asked for."""
         wanted = {job.preview: self.arguments.png, job.explanation: self.arguments.explain}
         outputs = [job.target, *(path for path, asked in wanted.items() if asked)]
-        kept = [str(path) for path in outputs if path.exists()]
-        if not kept or self.arguments.overwrite:
+        if self.arguments.overwrite or not all(path.exists() for path in outputs):
             return None
-        return _record(job) | {"status": "kept", "kept": kept}
+        return _record(job) | {"status": "kept", "kept": [str(path) for path in outputs]}
 
     def load(self, job: Job) -> Loaded | Record:
         """As `read`, also of a frame whose output is there."""
@@ -165,8 +163,8 @@ class Worker:
             self.compiled.add(shapes)
         about = about_of(frame, settings, spp_of(source, arguments))
         lights = split(light)
-        # Our own files hold converged direct light; other programs' is as noisy as the rest.
-        left = about["spp"] is None and frame.direct is not None and not arguments.direct
+        pixels = Pixels()
+        pixels.add(frame)
         record = {
             "width": light.shape[1],
             "height": light.shape[0],
@@ -175,11 +173,7 @@ class Worker:
             **about,
             "seconds": times[-1] - times[-2],
             "compile_seconds": times[-2] - times[0],
-            "warnings": [
-                *{str(warning.message): None for warning in caught},
-                *not_finite_pixels(frame),
-                *([DIRECT] if left else []),
-            ],
+            "warnings": warnings_of(caught, pixels, about, frame, arguments),
         }
         if arguments.profile:
             from jflnr.opencl.context import default_context
@@ -221,22 +215,24 @@ def _record(job: Job) -> Record:
 
 
 def _write(done: Denoised, arguments: argparse.Namespace) -> None:
-    """Write the preview, if asked for, and the EXR, with the input's header and windows."""
+    """Write what is not there: the EXR, with the input's header and windows, then the preview."""
     from jflnr import exr
     from jflnr.cli.preview import write_preview
     from jflnr.metrics import exposure
 
     job, source, frame, lights, error, about, _ = done
     picture = picture_of(frame, lights)
-    if arguments.png:
-        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        reflected = dataclasses.replace(frame, emission=None)
-        lit = picture_of(reflected, lights)
-        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
+    missing = lambda path: arguments.overwrite or not path.exists()
     mask = None if frame.mask is None else np.asarray(frame.mask)
     channels = layouts.output_channels(source, picture, lights, mask, arguments.channels)
     if error is not None:
         channels["error.Y"] = error[..., 0]
     comments = json.dumps(source.header | {"denoiser": about})
     attributes = source.attributes
-    exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
+    if missing(job.target):
+        exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
+    if arguments.png and missing(job.preview):
+        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
+        reflected = dataclasses.replace(frame, emission=None)
+        lit = picture_of(reflected, lights)
+        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))

@@ -96,12 +96,15 @@ def _use(source: layouts.Source) -> dict[str, Any]:
         images = layouts.assemble(source)
     except ValueError as error:
         return use | {"usable": False, "why": str(error)}
+    pixels, why = layouts.denoised(images)
     present = [layer for layer, image in images.items() if image is not None]
     named = {n: c for n, c in layout.channels.items() if set(c) <= set(source.channels)}
     return use | {
         "usable": True,
         "spp": layouts.native.spp_present(source.channels),
         "light": layout.light,
+        "pixels": pixels,
+        "warnings": [why] if why else [],
         "guides": [name for name in ("normal", "depth", "ao") if name in present],
         "composite": [name for name in ("albedo", "direct", "emission") if name in present],
         "reference": "reference" in present,
@@ -111,7 +114,7 @@ def _use(source: layouts.Source) -> dict[str, Any]:
 
 
 def _use_text(use: dict[str, Any]) -> list[str]:
-    notes = [f"  note         {note}" for note in use["notes"]]
+    notes = [f"  note         {note}" for note in [*use.get("warnings", ()), *use["notes"]]]
     if not use["usable"]:
         return [f"layout: {use['layout']}; jflnr denoise cannot use it: {use['why']}", *notes]
     light = exr.layer_of(use["channels"][use["light"]][0]) or "plain R, G, B"
@@ -121,6 +124,7 @@ def _use_text(use: dict[str, Any]) -> list[str]:
     return [
         f"layout: {use['layout']}; jflnr denoise would use",
         f"  noisy light  {', '.join(noisy)}",
+        f"  pixels       {use['pixels']} will be denoised",
         f"  guides       {', '.join(_named(name, use['channels']) for name in use['guides'])}",
         f"  composite    {', '.join(['denoised indirect', *parts])}",
         f"  reference    {'yes (--reference)' if use['reference'] else 'none'}",

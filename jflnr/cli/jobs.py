@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +46,7 @@ def natural(path: Path) -> list[tuple[float, str]]:
 
 
 def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
-    """One job per frame; raises ValueError if two results would meet or one replace an input."""
+    """One job per frame, its EXR apart from all that is read; raises ValueError."""
     files = expand(inputs)
     as_file = output.suffix.lower() == ".exr" and not output.is_dir()
     if as_file and (len(inputs) > 1 or inputs[0].is_dir()):
@@ -54,7 +54,11 @@ def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
     if not as_file and output.suffix.lower() in PICTURES:
         raise ValueError(f"{output}: OUT must end with .exr or be a folder (--png adds a preview)")
     jobs = [Job(file, output if as_file else output / f"{file.stem}.exr") for file in files]
-    _check_apart(jobs)
+    check_apart((job.target for job in jobs), files)
+    sources: dict[Path, Path] = {}
+    for job in jobs:
+        if (other := sources.setdefault(job.target, job.source)) is not job.source:
+            raise ValueError(f"{other} and {job.source} would both be written to {job.target}")
     return jobs
 
 
@@ -66,11 +70,17 @@ def make_folder(target: Path) -> None:
         raise OSError(f"{target} cannot be written: {error.filename}: {error.strerror}") from None
 
 
-def _check_apart(jobs: Sequence[Job]) -> None:
-    inputs = {job.source.resolve() for job in jobs}
-    sources: dict[Path, Path] = {}
-    for job in jobs:
-        if job.target.resolve() in inputs:
-            raise ValueError(f"{job.target}: OUT would replace an input")
-        if (other := sources.setdefault(job.target, job.source)) is not job.source:
-            raise ValueError(f"{other} and {job.source} would both be written to {job.target}")
+def check_apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
+    """Raise ValueError if an output is also an input; None stands for no file."""
+    given = {_identity(path) for path in inputs if path is not None}
+    for path in outputs:
+        if path is not None and _identity(path) in given:
+            raise ValueError(f"{path}: this output would replace an input")
+
+
+def _identity(path: Path) -> tuple[int, int] | Path:
+    """What two names of one file have in common."""
+    if not path.exists():
+        return path.resolve()
+    status = path.stat()
+    return status.st_dev, status.st_ino

@@ -44,6 +44,7 @@ def measure_files(a: Path, b: Path, spp: int) -> dict[str, float | None]:
     from jflnr import exr, metrics
     from jflnr.frame import read_frame
 
+    exr.check_aligned(a, b)
     channels_a, channels_b = exr.read_channels(a), exr.read_channels(b)
     if "reference" in exr.layers_of(channels_b):
         return metrics.measure(read_frame(b, spp), _light(channels_a, spp, a))

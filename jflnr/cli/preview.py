@@ -12,8 +12,5 @@ from jflnr.metrics import display
 def write_preview(path: Path, picture: np.ndarray, scale: float) -> None:
     """Write linear radiance (H, W, 3), times `scale`, as 8-bit PNG by the metrics' display rule."""
     pixels = np.round(255 * display(np.nan_to_num(picture), scale)).astype(np.uint8)
-    try:
-        with replacing(path) as beside:
-            Image.fromarray(pixels).save(beside, format="PNG")
-    except OSError as error:
-        raise OSError(f"{path} cannot be written: {error.strerror or error}") from None
+    with replacing(path) as beside:
+        Image.fromarray(pixels).save(beside, format="PNG")

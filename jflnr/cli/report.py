@@ -27,17 +27,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr.cli.jobs import expand, make_folder
+    from jflnr.cli.jobs import check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import collect
 
     output = arguments.output
     if output.is_dir():
         raise IsADirectoryError(f"{output} is a folder; name the HTML file to write")
+    paths = expand(arguments.inputs)
+    check_apart([output], [*paths, arguments.reference])
     if output.exists() and not arguments.overwrite:
         print(f"{output} kept as it is; --overwrite replaces it")
         return 0
-    scenes = collect(expand(arguments.inputs), arguments.spp, arguments.reference)
+    scenes = collect(paths, arguments.spp, arguments.reference)
     make_folder(output)
     title = arguments.title or ", ".join(scene.name for scene in scenes)
     write_report(output, scenes, title)

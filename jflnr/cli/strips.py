@@ -5,16 +5,18 @@ import contextlib
 import dataclasses
 import json
 import time
+import warnings
 from typing import Any
 
 import numpy as np
 
 import jflnr
-from jflnr import layouts
-from jflnr.cli.content import about_of, picture_of, split, spp_of, with_direct
+from jflnr import exr, layouts
+from jflnr.cli.content import Pixels, about_of, picture_of, split, spp_of, warnings_of, with_direct
 from jflnr.cli.jobs import Job
 from jflnr.frame import Frame, frame_of
-from jflnr.large.scanlines import Scanlines, writing
+from jflnr.images.inputs import warn_without_ao
+from jflnr.large.scanlines import Scanlines
 from jflnr.large.source import Rows
 
 # What the picture is put together from, and what the regression always reads.
@@ -30,19 +32,26 @@ def denoise_in_strips(
     start = time.perf_counter()
     file = Scanlines(job.source, arguments.spp, dict(arguments.map))
     first = file.part(0, 1, layouts.LAYERS)
+    whole = frame_of(first)  # but for its size
     settings = {"method": denoiser.method, "backend": denoiser.backend, "guides": denoiser.guides}
-    about = about_of(frame_of(first), settings, spp_of(first, arguments))
+    about = about_of(whole, settings, spp_of(first, arguments))
     comments = json.dumps(first.header | {"denoiser": about})
     size, window = (file.height, file.width), file.attributes.window
+    others = file.attributes.others
+    pixels = Pixels()
     with contextlib.ExitStack() as stack:
+        caught = stack.enter_context(warnings.catch_warnings(record=True))
+        warnings.simplefilter("always", UserWarning)
+        warn_without_ao(whole, denoiser.guides, denoiser.method)
         append, names = None, tuple(about["guides"])
         rows = _rows(file, names, arguments)
         for top, given in denoiser.strips(rows, names, tile, job.target.parent):
-            channels = _channels(file, top, given["image"], arguments)
+            channels = _channels(file, top, given["image"], arguments, names, pixels)
             if "error" in given:
                 channels["error.Y"] = given["error"][..., 0]
             if append is None:
-                output = writing(job.target, size, list(channels), comments, window)
+                types = dict.fromkeys(channels, np.float32)
+                output = exr.writing_rows(job.target, size, types, comments, window, others)
                 append = stack.enter_context(output)
             append(channels)
     return {
@@ -54,7 +63,7 @@ def denoise_in_strips(
         **about,
         "seconds": time.perf_counter() - start,
         "compile_seconds": 0,
-        "warnings": [],
+        "warnings": warnings_of(caught, pixels, about, whole, arguments),
     }
 
 
@@ -81,11 +90,17 @@ def _rows(file: Scanlines, names: tuple[str, ...], arguments: argparse.Namespace
 
 
 def _channels(
-    file: Scanlines, top: int, light: np.ndarray, arguments: argparse.Namespace
+    file: Scanlines,
+    top: int,
+    light: np.ndarray,
+    arguments: argparse.Namespace,
+    guides: tuple[str, ...],
+    pixels: Pixels,
 ) -> dict[str, np.ndarray]:
-    """What to write of a strip."""
-    part = file.part(top, top + light.shape[0], PICTURE)
+    """What to write of a strip, whose pixels are counted."""
+    part = file.part(top, top + light.shape[0], PICTURE.union(guides))
     frame, lights = frame_of(part), split(light)
+    pixels.add(frame)
     picture = picture_of(frame, lights)
     mask = None if frame.mask is None else np.asarray(frame.mask)
     return layouts.output_channels(part, picture, lights, mask, arguments.channels)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jflnr.cli.jobs import expand, make_folder
+from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
     from jflnr.network.train import Progress, Result, Settings
@@ -60,15 +60,17 @@ def run(arguments: argparse.Namespace) -> int:
     for name in ("batch", "every"):
         checks.positive_integer(f"--{name}", getattr(arguments, name))
     state = arguments.output.with_name(arguments.output.name + ".state")
+    paths, kept = expand(arguments.data), expand(arguments.val)
+    outputs = [arguments.output, state, arguments.output.with_suffix(".png")]
+    check_apart(outputs, [*paths, *kept, arguments.finetune])
     if arguments.output.exists() and not state.exists() and not arguments.overwrite:
         print(f"{arguments.output} kept as it is; --overwrite replaces it")
         return 0
     make_folder(arguments.output)
     if arguments.overwrite:
         state.unlink(missing_ok=True)
-    paths = expand(arguments.data)
     found = _read(paths, arguments.seed)
-    validation = _validation(arguments.val)
+    validation = _validation(kept)
     initial, widths = None, CONFIGS[arguments.config]
     if arguments.finetune is not None:
         initial, header = weights.load(arguments.finetune)
@@ -108,10 +110,10 @@ def _read(paths: Sequence[Path], seed: int) -> list:
     return found
 
 
-def _validation(given: Sequence[Path]) -> list:
+def _validation(paths: Sequence[Path]) -> list:
     from jflnr.frame import read_frame
 
-    frames = [read_frame(path) for path in (expand(given) if given else [])]
+    frames = [read_frame(path) for path in paths]
     if any(frame.reference is None for frame in frames):
         raise ValueError("--val: every frame needs a layer reference")
     return frames

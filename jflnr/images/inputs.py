@@ -26,15 +26,20 @@ def prepare(
     names = guide_layers.choose(frame, ("normal", "depth") if own else guides)
     inputs = frame_inputs(frame, names)
     _check_sizes(inputs)
-    if guides is None and frame.ao is None and not own:
-        warnings.warn(
-            "The frame has no ao layer, so the guides are normal and depth only; "
-            "shadows cast by indirect light may be lost.",
-            stacklevel=4,
-        )
+    warn_without_ao(frame, guides, method)
     if isinstance(frame.indirect, np.ndarray) and not np.isfinite(frame.indirect).any():
         raise ValueError("frame.indirect has no finite value, so there is nothing to denoise")
     return names, inputs
+
+
+def warn_without_ao(frame: Frame, guides: Sequence[str] | None, method: Any) -> None:
+    """Warn if a guide is not there that nobody has left out."""
+    if guides is None and frame.ao is None and not hasattr(method, "features"):
+        warnings.warn(
+            "The frame has no ao layer, so the guides are normal and depth only; "
+            "shadows cast by indirect light may be lost.",
+            stacklevel=5,
+        )
 
 
 def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:

@@ -1,22 +1,19 @@
-"""EXR files read and written a few rows at a time, through OpenImageIO.
+"""EXR files read a few rows at a time, through OpenImageIO.
 
 OpenEXR's own Python module only knows whole files. Files of one part in scan lines can be read so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from jflnr import exr, layouts
-from jflnr.files import replacing
 from jflnr.frame import Frame
 from jflnr.large.source import Rows
-from jflnr.layouts.override import override
 from jflnr.layouts.source import recognise
 
 # Rows that are decoded at a time; every compression packs a divisor of it together.
@@ -55,9 +52,7 @@ class Scanlines:
             )
         self.height, self.width, self.channels = spec.height, spec.width, spec.channelnames
         nothing = dict.fromkeys(self.channels, np.zeros((1, 1)))
-        self.layout = recognise(nothing, spp)
-        if names:
-            self.layout = override(self.layout, nothing, names, path)
+        self.layout = recognise(nothing, spp, names, path)
         if len(nothing) > len(self.channels):
             raise ValueError(f"{path}: --map to another file needs both whole: raise --memory")
 
@@ -65,6 +60,7 @@ class Scanlines:
         """Rows `start` to `stop` of the channels that make up these layers of a frame."""
         wanted = {*NEEDED, *layers}
         names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
+        names |= set(self.layout.picture[3:])  # alpha, which goes on to the output
         channels = self._read(start, stop, sorted(names & set(self.channels)))
         (x, y), display = self.attributes.window
         attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
@@ -92,46 +88,3 @@ class Scanlines:
             for plane, place in zip(found, places, strict=True):
                 plane[row - start : end - start] = pixels[..., place - first]
         return dict(zip(names, found, strict=True))
-
-
-@contextmanager
-def writing(
-    path: Path,
-    size: tuple[int, int],
-    names: list[str],
-    comments: str = "",
-    window: exr.Window | None = None,
-    kind: str = "float",
-) -> Iterator[Callable[[Mapping[str, np.ndarray]], None]]:
-    """A function that appends rows of the channels `names` to a new file, there at the end.
-
-    size: height and width. kind: what the channels are stored as, float or half. Raises OSError.
-    """
-    window = window or exr.Window()
-    io = _openimageio()
-    spec = io.ImageSpec(size[1], size[0], len(names), kind)
-    spec.channelnames = names
-    spec.x, spec.y = window.origin
-    if window.display:
-        left, top, right, bottom = window.display
-        spec.full_x, spec.full_y = left, top
-        spec.full_width, spec.full_height = right - left + 1, bottom - top + 1
-    # As `exr.write_channels` does.
-    spec.attribute("compression", "none" if kind == "float" else "zip")
-    spec.attribute("comments", comments)
-    row, stored = spec.y, np.float32 if kind == "float" else np.float16
-    with replacing(path) as beside:
-        file = io.ImageOutput.create(str(beside))
-        if not file.open(str(beside), spec):
-            raise OSError(f"{path} cannot be written: {file.geterror()}")
-
-        def append(channels: Mapping[str, np.ndarray]) -> None:
-            nonlocal row
-            pixels = np.stack([channels[name].astype(stored) for name in names], axis=-1)
-            if not file.write_scanlines(row, row + pixels.shape[0], 0, pixels):
-                raise OSError(f"{path} cannot be written: {file.geterror()}")
-            row += pixels.shape[0]
-
-        yield append
-        if not file.close():
-            raise OSError(f"{path} cannot be written: {file.geterror()}")

@@ -8,7 +8,8 @@ from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
 from jflnr.layouts.channels import LAYERS, Layout, layer
 from jflnr.layouts.output import CHOICES, output_channels
-from jflnr.layouts.source import Source, load, parse_header, picture
+from jflnr.layouts.source import Source, load, picture
+from jflnr.layouts.surface import denoised
 
 __all__ = [
     "CHOICES",
@@ -16,10 +17,10 @@ __all__ = [
     "Layout",
     "Source",
     "assemble",
+    "denoised",
     "layer",
     "load",
     "native",
     "output_channels",
-    "parse_header",
     "picture",
 ]

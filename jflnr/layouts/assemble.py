@@ -8,13 +8,11 @@ from jflnr.layouts.camera import camera_of, depth_of, position_of
 from jflnr.layouts.channels import LAYERS, NATIVE, layer
 from jflnr.layouts.light import DARK, demodulate, rest
 from jflnr.layouts.source import Source
+from jflnr.layouts.surface import SKY
 
 Layers = dict[str, np.ndarray | None]
 
 GUIDES = ("albedo", "normal", "depth")  # what no frame can do without
-
-# Farther than anything: programs write 1e10 or infinity where nothing is hit.
-SKY = 1e9
 
 
 def assemble(source: Source) -> Layers:
@@ -39,10 +37,16 @@ def assemble(source: Source) -> Layers:
         needed.remove("depth")
     images: Layers = {name: read(name) for name in names if name in needed | there}
     images = dict.fromkeys(LAYERS) | images
+    if source.part and layout.program == "pbrt" and (read("depth") < 0).any():
+        raise ValueError(
+            "depth is negative in places, which only the whole file can explain: raise --memory"
+        )
+    if images["depth"] is not None:  # a camera that looks along -z
+        images["depth"] = np.abs(images["depth"])
     if camera is not None:
         images |= _derived(images, camera, source.attributes.window)
     if layout.light != "indirect" or "beauty" in layout.channels:
-        images |= _separated(images, source.part)
+        images |= _separated(images)
     if layout.motion_up and images["motion"] is not None:
         images["motion"] = images["motion"] * np.array([1, -1], np.float32)
     return {name: images[name] for name in LAYERS}
@@ -59,24 +63,25 @@ def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
 
 
 @np.errstate(invalid="ignore", over="ignore")
-def _separated(images: Layers, part: bool) -> Layers:
+def _separated(images: Layers) -> Layers:
     """The layers of another program's picture: what is denoised, and the rest of the picture.
 
     `albedo * (direct + indirect) + emission` is the beauty again. Where there is no surface or all
-    of its albedo is at most `DARK`, the picture passes through as it is: albedo and mask are 0.
+    of its albedo is at most `DARK`, the picture passes through as it is: albedo and mask are 0. So
+    it does where one of its layers is NaN or infinite; such an albedo stays, to be counted.
     """
     depth, albedo, beauty = images["depth"], images["albedo"], images.get("beauty")
     assert depth is not None and albedo is not None
-    if part and (depth < 0).any():
-        raise ValueError(
-            "depth is negative in places, which only the whole file can explain: raise --memory"
-        )
-    depth = np.where((depth > 0) & (depth < SKY), depth, 0)
+    others = (images[name] for name in ("albedo", "normal", "direct", "emission"))
+    known = [_finite(image) for image in others if image is not None]
+    known = np.logical_and.reduce([*known, ~np.isnan(depth)])
+    depth = np.where((depth < SKY) | np.isnan(depth), depth, 0)
     mask, indirect, emission = images["mask"], images["indirect"], images["emission"]
     if mask is None:
         surface = (depth > 0) & (albedo > DARK).any(axis=-1, keepdims=True)
         mask = surface.astype(np.float32)
-    albedo = np.where(mask > 0, albedo, 0)
+    mask = np.where(known, mask, 0)
+    given, albedo = albedo, np.where(mask > 0, albedo, 0)
     if indirect is None:
         radiance = images.get("radiance")
         radiance = beauty if radiance is None else radiance
@@ -89,8 +94,13 @@ def _separated(images: Layers, part: bool) -> Layers:
         emission = rest(beauty, albedo, indirect if direct is None else direct + indirect)
     return {
         "depth": depth,
-        "albedo": albedo,
+        "albedo": np.where(_finite(given), albedo, given),
         "mask": mask,
         "indirect": indirect,
         "emission": emission,
     }
+
+
+def _finite(image: np.ndarray) -> np.ndarray:
+    """Where all of a layer (H, W, C) are numbers, (H, W, 1)."""
+    return np.isfinite(image).all(axis=-1, keepdims=True)

@@ -19,7 +19,7 @@ def camera_of(header: Mapping[str, Any]) -> Camera | None:
             return Camera.of(header)
         to_camera = np.array(header["worldToCamera"], np.float64).reshape(4, 4)
         return Camera(np.linalg.inv(to_camera), None)
-    except (TypeError, ValueError, np.linalg.LinAlgError):
+    except (TypeError, ValueError, OverflowError, np.linalg.LinAlgError):
         return None
 
 

@@ -27,8 +27,9 @@ NATIVE = {layer: tuple(f"{layer}.{c}" for c in parts) for layer, parts in LAYERS
 # Every half number as float32, by its bits: numpy converts slower than it looks up.
 HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 
-# In the order of both `R G B` and `X Y Z`; `red` and the like count by their first letter.
+# In the order of both `R G B` and `X Y Z`.
 ORDER = "RXUGYVBZT"
+WORDS = {"red": "R", "green": "G", "blue": "B"}
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,19 @@ class Layout:
 
 
 def in_layer(channels: Iterable[str], layer: str) -> tuple[str, ...]:
-    """The colour or vector channels of `layer`, in order, without alpha."""
-    own = [name for name in channels if layer_of(name) == layer]
-    letters = {name: name.rpartition(".")[2][:1].upper() for name in own}
-    kept = [name for name in own if letters[name] and letters[name] in ORDER]
-    return tuple(sorted(kept, key=lambda name: ORDER.index(letters[name])))
+    """The colour or vector channels of `layer`, in order, without alpha.
+
+    Where there are three colours, another channel beside them (`R G B A Z`) is not of the layer.
+    """
+    own = {_letter(name): name for name in channels if layer_of(name) == layer}
+    kept = "RGB" if set("RGB") <= set(own) else ORDER
+    return tuple(own[letter] for letter in kept if letter in own)
+
+
+def _letter(channel: str) -> str:
+    """`R` for `albedo.R`, `albedo.r` and `albedo.red`."""
+    component = channel.rpartition(".")[2]
+    return WORDS.get(component.lower(), component.upper())
 
 
 def layer(

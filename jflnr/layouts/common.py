@@ -23,9 +23,9 @@ BEAUTY = ("", "beauty", "composite", "rgba", "rgb", "color")
 NOTE = "the picture is divided by albedo and denoised; where the names mislead, use --map"
 
 
-def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
-    """None unless there are a picture and an albedo by such names."""
-    names = find(channels)
+def layout(channels: Mapping[str, np.ndarray], mapped: dict[str, tuple[str, ...]]) -> Layout | None:
+    """None unless there are a picture and an albedo, by such names or as the user says."""
+    names = find(channels) | mapped
     if not {"beauty", "albedo"} <= set(names):
         return None
     return Layout("unknown, by common names", names, picture(channels, names), (NOTE,))
@@ -37,16 +37,16 @@ def find(channels: Mapping[str, np.ndarray]) -> dict[str, tuple[str, ...]]:
     found = {}
     for layer, usual in (NAMES | {"beauty": BEAUTY}).items():
         by_name = {stem.rpartition(".")[2].lower(): stem for stem in reversed(layers)}
-        stems = [by_name[name] for name in usual if name in by_name]
-        candidates = [in_layer(channels, stem) for stem in stems]
+        candidates = [in_layer(channels, by_name[name]) for name in usual if name in by_name]
+        candidates += [(name,) for name in channels if name.lower() in usual]
         count = 1 if layer in ("depth", "ao") else 3
         if fitting := [names for names in candidates if len(names) == count]:
             found[layer] = fitting[0]
-    return {"depth": ("Z",)} | found if "Z" in channels else found
+    return found
 
 
 def picture(channels: Iterable[str], names: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     """The channels of the beauty, and its alpha if it has one."""
     first = names["beauty"][0]
-    alpha = f"{first[:-1]}A" if first.endswith("R") else ""
+    alpha = first[:-1] + {"R": "A", "r": "a"}.get(first[-1], "")
     return names["beauty"] + ((alpha,) if alpha in channels else ())

@@ -1,7 +1,7 @@
 """The user's own word on which channels a layer is made of (`--map`, `read_frame(layers=...)`)."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,31 +15,41 @@ FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE)
 BORROWED = "file://"  # how the names of another file's channels start
 
 
-def override(
-    layout: Layout, channels: dict[str, np.ndarray], layers: Mapping[str, str], path: Path
-) -> Layout:
-    """`layout` with `layers` made of what the user says; channels of other files are added.
+def find(
+    channels: dict[str, np.ndarray], layers: Mapping[str, str], path: Path
+) -> dict[str, tuple[str, ...]]:
+    """The channels of the `layers` that the user maps; those of other files are added.
 
     A value is a layer of the file, channels with commas between them, or `FILE.exr`, seen from the
     folder of `path`, with `:` and one of those after it; `{stem}` in it is the stem of `path`.
     Raises ValueError if there is no such thing, and OSError as `read_channels` does.
     """
-    names = dict(layout.channels)
+    found = {}
     for name, value in layers.items():
         checks.choice("layers", name, (*LAYERS, "beauty", "radiance"))
-        names[name] = _find(channels, name, value, path)
+        found[name] = _find(channels, name, value, path)
     exr.check_sizes(path, channels)
-    if "radiance" in layers or (
-        "beauty" in layers and not set(names.get("indirect", ())) & set(channels)
+    return found
+
+
+def override(
+    layout: Layout, mapped: dict[str, tuple[str, ...]], channels: Collection[str]
+) -> Layout:
+    """`layout` with what the user maps of a file that holds `channels`."""
+    names = dict(layout.channels)
+    if "radiance" in mapped or (
+        "beauty" in mapped and not set(names.get("indirect", ())) & set(channels)
     ):
-        names = {n: c for n, c in names.items() if n not in ("indirect", "direct") or n in layers}
-    return replace(layout, channels=names, picture=layout.picture or names.get("beauty", ()))
+        names = {n: c for n, c in names.items() if n not in ("indirect", "direct")}
+    picture = layout.picture or mapped.get("beauty", ())
+    return replace(layout, channels=names | mapped, picture=picture)
 
 
 def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) -> tuple[str, ...]:
     """The channels that `value` means; those of another file are added to `channels`."""
     if match := FILE.fullmatch(value):
         other = path.parent / match["file"].replace("{stem}", path.stem)
+        exr.check_aligned(path, other)
         read = exr.read_channels(other)
         found = _choose(read, name, match["name"] or "", str(other))
         borrowed = {f"{BORROWED}{other}:{channel}": read[channel] for channel in found}

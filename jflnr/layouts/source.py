@@ -1,6 +1,6 @@
 """A file, and what its channels mean."""
 
-import json
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from jflnr import checks, exr
+from jflnr.files import json_object
 from jflnr.layouts import blender, common, mitsuba, native, pbrt
 from jflnr.layouts.channels import Layout, layer, present
-from jflnr.layouts.override import override
+from jflnr.layouts.override import find, override
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Source:
     @property
     def header(self) -> dict:
         """The JSON object in the header's `comments`; {} if there is none."""
-        return parse_header(self.attributes.comments)
+        return json_object(self.attributes.comments)
 
 
 def load(
@@ -43,20 +44,27 @@ def load(
     if spp is not None:
         checks.positive_integer("spp", spp)
     path, attributes, channels = Path(path), exr.read_attributes(path), exr.read_channels(path)
-    layout = recognise(channels, spp)
-    if layers:
-        layout = override(layout, channels, layers, path)
-    return Source(path, channels, attributes, layout)
+    return Source(path, channels, attributes, recognise(channels, spp, layers or {}, path))
 
 
-def recognise(channels: Mapping[str, np.ndarray], spp: int | None = None) -> Layout:
-    """The layout that the names of `channels` are in; the native one if they are in no other."""
-    counts = native.spp_present(channels)
+def recognise(
+    channels: dict[str, np.ndarray],
+    spp: int | None = None,
+    layers: Mapping[str, str] | None = None,
+    path: Path = Path(),
+) -> Layout:
+    """The layout that the names of `channels` are in; the native one if they are in no other.
+
+    layers: as for `load`, of the file at `path`; channels of other files are added.
+    """
+    own, counts = dict(channels), native.spp_present(channels)
+    mapped = find(channels, layers or {}, path)
     if not counts:
-        for program in (blender, pbrt, mitsuba, common):
-            if (found := program.layout(channels)) is not None:
-                return found
-    return native.layout(spp or (counts or [1])[0], channels)
+        usual = functools.partial(common.layout, mapped=mapped)
+        for program in (blender.layout, pbrt.layout, mitsuba.layout, usual):
+            if (found := program(own)) is not None:
+                return override(found, mapped, own)
+    return override(native.layout(spp or (counts or [1])[0], own), mapped, own)
 
 
 def picture(channels: Mapping[str, np.ndarray], source: str) -> np.ndarray:
@@ -64,15 +72,6 @@ def picture(channels: Mapping[str, np.ndarray], source: str) -> np.ndarray:
 
     Raises ValueError, naming `source`, if there is none.
     """
-    names = tuple("RGB") if "R" in channels else recognise(channels).picture[:3]
+    names = tuple("RGB") if "R" in channels else recognise(dict(channels)).picture[:3]
     advice = f"there is no picture in it; {present(channels)}"
     return layer(channels, "beauty", names or tuple("RGB"), source, advice)
-
-
-def parse_header(comments: str) -> dict:
-    """The JSON object in `comments`; {} if there is none."""
-    try:
-        header = json.loads(comments)
-    except json.JSONDecodeError:
-        return {}
-    return header if isinstance(header, dict) else {}

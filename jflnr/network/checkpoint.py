@@ -24,7 +24,9 @@ def load_state(path: Path, like: Any, run: dict[str, Any]) -> tuple[Any, list]:
             f"{path}: the state of another run ({header.get('run')}); this one is {run}. "
             "Remove the file to begin anew"
         )
+    if not isinstance(header.get("history"), list):
+        raise ValueError(f"{path}: not the state of a training run. Remove the file")
     try:
         return arrays.restore(stored, like), header["history"]
-    except (ValueError, KeyError) as error:
+    except ValueError as error:
         raise ValueError(f"{path}: not the state of this training run ({error})") from None

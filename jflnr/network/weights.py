@@ -62,7 +62,8 @@ def _widths(path: str | Path, header: dict[str, Any]) -> tuple[int, ...]:
     """Those of a header that this version reads."""
     if header.get("format") != FORMAT:
         raise ValueError(f"{path}: not {WANTED}")
-    for name, wanted in (("version", VERSION), ("features", features.COUNT)):
+    known = {"version": VERSION, "features": features.COUNT, "guides": list(features.GUIDES)}
+    for name, wanted in known.items():
         if header.get(name) != wanted:
             raise ValueError(
                 f"{path}: {name} is {header.get(name)}; this jflnr reads {wanted}, so train anew"

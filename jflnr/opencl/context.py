@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,13 +28,15 @@ class Launch(NamedTuple):
 class Context:
     """A device, its queue, compiled programs, a pool of buffers and, on request, a profile.
 
+    Threads may share one: their kernels run one after another. A forked process may not.
+
     device: a `pyopencl.Device`, its number or a part of its name (see `jflnr devices`), or None
     for the best one. work_group: number of work-items in x of a work-group; results do not depend
     on it. Raises `NoDevice` or `ValueError`.
     """
 
     def __init__(self, device: Any = None, *, work_group: int | None = None) -> None:
-        self.cl = cl = devices.pyopencl()
+        cl = self.cl
         named = device is None or isinstance(device, str | int)
         self.device = devices.choose(device) if named else device
         # A processor shares its memory with numpy: arrays are used where they lie.
@@ -42,10 +47,17 @@ class Context:
         )
         self.pool = cl.tools.MemoryPool(cl.tools.ImmediateAllocator(self.queue))
         self.work_group = work_group or (32 if self.on_cpu else 64)
-        self.launches: list[Launch] | None = None
         self._programs: dict[tuple[Any, ...], Any] = {}
         self._kernels: dict[tuple[Any, ...], Any] = {}
-        self._in_use: list[np.ndarray] = []
+        self._lock = threading.Lock()  # from setting a kernel's arguments until it is enqueued
+        # What a thread has given to kernels that may not be through, and what it has launched.
+        self._in_use: dict[int, list[np.ndarray]] = {}
+        self._launches: dict[int, list[Launch]] = {}
+
+    @property
+    def cl(self) -> ModuleType:
+        """The module pyopencl. Raises `NoDevice` in a process in which it cannot be used."""
+        return devices.pyopencl()
 
     def width(self, block: int | None = None, across: bool = False) -> int:
         """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given.
@@ -79,13 +91,28 @@ class Context:
         group = group or (1 if alone and self.on_cpu else self.work_group)
         local = (group, *(1 for _ in size[1:]))
         padded = tuple(math.ceil(n / m) * m for n, m in zip(size, local, strict=True))
-        event = self._kernel(name, file, defines, arguments)(
-            self.queue, padded, local, *map(_argument, arguments)
-        )
-        if self.launches is not None:
+        with self._lock:
+            event = self._kernel(name, file, defines, arguments)(
+                self.queue, padded, local, *map(_argument, arguments)
+            )
+        if (launches := self._launches.get(threading.get_ident())) is not None:
             arrays = {id(a): a.nbytes for a in arguments if hasattr(a, "nbytes")}
             moved = sum(arrays.values()) if moved is None else moved
-            self.launches.append(Launch(name, event, moved))
+            launches.append(Launch(name, event, moved))
+
+    @contextlib.contextmanager
+    def recorded(self) -> Iterator[list[Launch]]:
+        """What this thread launches meanwhile."""
+        launches = self._launches[threading.get_ident()] = []
+        try:
+            yield launches
+        finally:
+            del self._launches[threading.get_ident()]
+
+    def scale(self, output: Any, factor: np.float32) -> None:
+        """Multiply a device array in place: pyopencl has one kernel for that in all threads."""
+        with self._lock:
+            output *= factor
 
     def empty(self, shape: Sequence[int], dtype: Any = np.float32) -> Any:
         """An uninitialised device array, from memory that earlier frames have given back."""
@@ -100,7 +127,7 @@ class Context:
             return values
         if not self.on_cpu:
             return self.cl.array.to_device(self.queue, values, allocator=self.pool)
-        self._in_use.append(values)  # until the kernels that use it are through
+        self._in_use.setdefault(threading.get_ident(), []).append(values)
         flags = self.cl.mem_flags
         access = flags.READ_WRITE if writable else flags.READ_ONLY
         buffer = self.cl.Buffer(self.context, access | flags.USE_HOST_PTR, hostbuf=values)
@@ -110,7 +137,7 @@ class Context:
         """Make the device array `output` readable as `result`, a numpy array or `output` itself."""
         if self.on_cpu:
             self.queue.finish()
-            self._in_use.clear()
+            self._in_use.pop(threading.get_ident(), None)
         if output is not result and not self.on_cpu:
             output.get(ary=result)
         elif output is not result:
@@ -171,7 +198,12 @@ def _folder() -> Any:
     return installed if installed.is_dir() else Path(__file__).parents[2] / "kernels_cl"
 
 
-@functools.cache
 def default_context() -> Context:
     """The best device, set up once."""
-    return Context()
+    devices.pyopencl()  # in a forked process the lock may be held for ever
+    with _setting_up:
+        return _default_context()
+
+
+_setting_up = threading.Lock()
+_default_context = functools.cache(Context)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from types import ModuleType
 from typing import Any
@@ -13,7 +14,7 @@ KINDS = ("GPU", "ACCELERATOR", "CPU", "CUSTOM")
 
 
 class NoDevice(ImportError):
-    """There is no OpenCL device, or no pyopencl, here."""
+    """There is no OpenCL device, or no pyopencl, here, or this process cannot use it."""
 
 
 def pyopencl() -> ModuleType:
@@ -25,7 +26,18 @@ def pyopencl() -> ModuleType:
         import pyopencl.tools
     except ImportError as error:
         raise NoDevice(f"The opencl backend needs pyopencl ({error}); {ADVICE}") from None
+    if _first_user() != os.getpid():
+        raise NoDevice(
+            "OpenCL was used before this process was forked, and its threads do not live on here; "
+            "start processes with multiprocessing's method 'spawn' or 'forkserver'"
+        )
     return pyopencl
+
+
+@functools.cache
+def _first_user() -> int:
+    """The process that used OpenCL first; a forked one inherits the answer."""
+    return os.getpid()
 
 
 def all_devices() -> list[Any]:

@@ -75,7 +75,7 @@ def flnr(
     if method.keep_energy:
         rescale(context, image, images[0], weight, output)
     if unit != 1:
-        output *= unit
+        context.scale(output, unit)
     return context.finish(output, result)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from jflnr.opencl.context import Context, Launch
+from jflnr.opencl.context import Context
 
 COPIED = 64 << 20  # bytes read and as many written by the copy kernel: more than caches hold
 
@@ -43,14 +43,10 @@ def profile(context: Context, work: Callable[[], Any], repeats: int = 10) -> lis
 
 def _launches(context: Context, work: Callable[[], Any]) -> dict[str, tuple[float, int]]:
     """Milliseconds and bytes by kernel of one run of `work` and of the copy kernel."""
-    launches: list[Launch] = []
-    context.launches = launches
-    try:
+    with context.recorded() as launches:
         work()
         _copy(context)
         context.queue.finish()
-    finally:
-        context.launches = None
     summed: dict[str, tuple[float, int]] = {}
     for launch in launches:
         ms, moved = summed.get(launch.kernel, (0.0, 0))

@@ -80,6 +80,7 @@ def collect(paths: Sequence[Path], spp: int, reference: Path | None) -> list[Sce
     scenes = []
     for source in frames:
         names = _names([path for path in pictures if owners[path] == source], source.stem)
+        exr.check_aligned(source, *names)
         lights = {name: _light(channels[path], path, "indirect") for path, name in names.items()}
         direct = {
             name: _light(channels[path], path, "direct")
@@ -97,6 +98,7 @@ def _is_picture(channels: dict[str, np.ndarray]) -> bool:
 
 def _plain(paths: Sequence[Path], channels: dict, reference: Path | None) -> Scene:
     names = _names(paths)
+    exr.check_aligned(*paths, *([] if reference is None else [reference]))
     images = {name: layouts.picture(channels[p], str(p)) for p, name in names.items()}
     if reference is not None:
         images[REFERENCE] = layouts.picture(exr.read_channels(reference), str(reference))

@@ -219,7 +219,31 @@ def test_an_existing_preview_is_kept_too(
 ) -> None:
     (tmp_path / "out.png").write_bytes(b"precious")
     assert run(frame_file, "-o", tmp_path / "out.exr", "--png") == 0
-    assert (tmp_path / "out.png").read_bytes() == b"precious" and not stand_in
+    assert (tmp_path / "out.png").read_bytes() == b"precious"
+    assert "indirect.R" in exr.read_channels(tmp_path / "out.exr")
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_a_frame_is_done_when_all_that_was_asked_for_is_there(
+    tmp_path: Path, frame_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The EXR comes first; what a run could not write, the next one does."""
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    out = tmp_path / "out.exr"
+    with monkeypatch.context() as patch:
+        patch.setattr(exr, "write_channels", full)
+        assert run(frame_file, "-o", out, "--png") == 2
+        assert files(tmp_path) == [frame_file.name]
+    with monkeypatch.context() as patch:
+        patch.setattr("PIL.Image.Image.save", full)
+        assert run(frame_file, "-o", out, "--png") == 2
+        assert files(tmp_path) == [frame_file.name, "out.exr"]
+    written = out.read_bytes()
+    assert run(frame_file, "-o", out, "--png") == 0
+    assert out.with_suffix(".png").stat().st_size and out.read_bytes() == written
 
 
 @pytest.mark.usefixtures("stand_in")
@@ -274,7 +298,7 @@ ERRORS = [
     (("frames", "-o", "out.exr"), "OUT must be a folder when there are several frames"),
     (("empty", "-o", "out"), "there is no EXR file in this folder"),
     (("frame.exr", "-o", "out.png"), "OUT must end with .exr or be a folder"),
-    (("frame.exr", "-o", "frame.exr"), "OUT would replace an input"),
+    (("frame.exr", "-o", "frame.exr"), "would replace an input"),
     (("frame.exr", "frames/a.exr", "frames/../frames/a.exr", "-o", "o"), "would both be written"),
     (("frame.exr", "-o", "notes.txt/out.exr"), "notes.txt/out.exr cannot be written"),
     (("frame.exr", "-o", "out.exr", "--spp", "4"), "there is indirect light for spp 1"),

@@ -52,6 +52,7 @@ def test_what_is_saved_is_loaded_in_half_precision(file):
         {"header": header("{}")},
         {"header": header("[" * 5000)},
         {"header": header('{"format": "jflnr network", "version": 99}')},
+        {"header": header('{"a":' * 5000)},
     ],
     ids=lambda changed: str(next(iter(changed))),
 )
@@ -67,6 +68,15 @@ def test_impossible_widths_are_refused(file, value):
         text = before["header"].tobytes().decode()
     rewrite(file, header=header(text.replace("[4, 8]", value)))
     with pytest.raises(ValueError, match="widths is"):
+        weights.load(file)
+
+
+@pytest.mark.parametrize("value", ['["x"]', '["normal"]', "null"])
+def test_other_guides_are_refused(file, value):
+    with np.load(file) as before:
+        text = before["header"].tobytes().decode()
+    rewrite(file, header=header(text.replace('["normal", "depth", "ao"]', value)))
+    with pytest.raises(ValueError, match="guides is"):
         weights.load(file)
 
 

@@ -34,7 +34,6 @@ def test_every_kernel_has_a_row(context: Context) -> None:
     h, pitch = 8, -(-26 // context.width()) * context.width()
     moments = 39 * h * pitch * 4
     assert rows["moments"].bytes == target.nbytes + guides.nbytes + moments + 5 * 4
-    assert context.launches is None
 
 
 def test_devices_command(context: Context, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,71 @@
+"""Calls from several threads at a time, against the same calls from one."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import jflnr
+from experiments import plots, results
+
+NAME = "threads"
+QUESTION = "Do calls from several threads give what the same calls give one after another?"
+MINUTES = 10
+
+METHODS = ("flr", "flr-adaptive", "bmfr")
+THREADS, CALLS, FRAMES = 8, 10_000, 12
+# How often threads take turns: as often as Python lets them.
+INTERVAL = 1e-6
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """How many results differ, by method and back end, of `CALLS` in all."""
+    cases = list(itertools.product(METHODS, jflnr.BACKENDS))
+    calls = 10 if quick else -(-CALLS // len(cases))
+    rows = []
+    for method, backend in cases:
+        wrong = differing(made_up(FRAMES), method, backend, calls)
+        rows.append({"method": method, "backend": backend, "calls": calls, "wrong": wrong})
+    return {"cases": rows, "threads": THREADS}
+
+
+def made_up(count: int, brightness: float = 1) -> list[jflnr.Frame]:
+    """Frames of noise over smooth guides, of random sizes."""
+    rng, frames = np.random.default_rng(0), []
+    for height, width in rng.integers(17, 97, (count, 2)):
+        y, x = np.mgrid[:height, :width].astype(np.float32)[..., None] / 32
+        noise = rng.exponential(brightness, (height, width, 3)).astype(np.float32)
+        normal = np.concatenate([np.sin(x), np.sin(y), 1 + 0 * x], axis=-1)
+        frames.append(jflnr.Frame(noise, 0 * noise + 1, normal, 2 + x + y, ao=0.5 + 0 * x))
+    return frames
+
+
+def differing(frames: list[jflnr.Frame], method: str, backend: str, calls: int) -> int:
+    """How many of `calls` results of `THREADS` threads are not, to the bit, those of one."""
+
+    def call(number: int) -> bytes:
+        frame = frames[number % len(frames)]
+        return np.asarray(jflnr.denoise(frame, method, backend=backend)).tobytes()
+
+    alone = [call(i) for i in range(len(frames))]
+    wrong = lambda number: call(number) != alone[number % len(frames)]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(INTERVAL)
+    try:
+        with warnings.catch_warnings(), ThreadPoolExecutor(THREADS) as pool:
+            warnings.simplefilter("ignore")
+            return sum(pool.map(wrong, range(calls)))
+    finally:
+        sys.setswitchinterval(before)
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """threads.md: wrong results by method and back end."""
+    columns = {"method": "method", "backend": "back end", "calls": "calls", "wrong": "wrong"}
+    plots.write_text(folder / f"{NAME}.md", results.table(result["cases"], columns))

@@ -1,0 +1,179 @@
+"""What is around a command: terminals, closed streams, interruptions, other files."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from jflnr import exr
+from jflnr.cli import main
+from jflnr.files import replacing
+
+JFLNR = f"{sys.executable} -m jflnr"
+INFO, DENOISE = "info frame.exr", "denoise frame.exr -o out.exr"
+
+
+def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    where = {"PYTHONPATH": str(Path(__file__).parents[2])}
+    return subprocess.run(
+        ["bash", "-c", line],
+        cwd=folder,
+        env=os.environ | where | environment,
+        capture_output=True,
+        timeout=300,
+    )
+
+
+@pytest.mark.parametrize("closed", ["1>&-", "2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
+def test_closed_streams(frame_file: Path, closed: str) -> None:
+    done = shell(f"{JFLNR} {DENOISE} {closed}", frame_file.parent)
+    assert done.returncode == 0
+    assert "indirect.R" in exr.read_channels(frame_file.with_name("out.exr"))
+    assert shell(f"{JFLNR} info gone.exr {closed}", frame_file.parent).returncode == 2
+
+
+def test_a_full_terminal_is_one_sentence(frame_file: Path) -> None:
+    done = shell(f"{JFLNR} {INFO} > /dev/full", frame_file.parent)
+    assert done.returncode == 2
+    assert done.stderr == b"jflnr: no space left on device\n"
+
+
+@pytest.mark.parametrize("name", ["絵.exr".encode(), b"\xe9.exr"])
+def test_names_that_the_terminal_has_no_letters_for(frame_file: Path, name: bytes) -> None:
+    folder = frame_file.parent
+    (folder / "in").mkdir()
+    for path in (name, b"z.exr"):
+        os.link(frame_file, os.fsencode(folder / "in") + b"/" + path)
+    line = f"{JFLNR} denoise in -o out -v --png"
+    done = shell(line, folder, PYTHONIOENCODING="cp1252", PYTHONUTF8="0")
+    assert done.returncode == 0, done.stderr
+    assert len(list((folder / "out").iterdir())) == 4
+
+
+def test_the_longest_names_can_be_written(tmp_path: Path, frame_file: Path) -> None:
+    name = "ü" * 125 + ".exr"
+    for start in (name, "n" * 251 + ".exr", "a", ".exr"):
+        with replacing(tmp_path / start) as beside:
+            beside.write_bytes(b"x")
+        assert (tmp_path / start).read_bytes() == b"x"
+
+
+def test_a_full_disk_names_the_file(tmp_path: Path) -> None:
+    with (
+        pytest.raises(OSError, match=r"out\.npz cannot be written: No space left on device"),
+        replacing(tmp_path / "out.npz") as beside,
+    ):
+        beside.unlink()
+        beside.symlink_to("/dev/full")
+        beside.write_bytes(b"x")
+    with pytest.raises(OSError, match=r"^[^ ]*/gone/out\.npz cannot be written: No such"):
+        replacing(tmp_path / "gone" / "out.npz").__enter__()
+
+
+@pytest.mark.parametrize(
+    "line", ["info pipe", "denoise frame.exr -o o.exr --method flnr --params pipe"]
+)
+def test_a_pipe_is_no_file(frame_file: Path, line: str) -> None:
+    os.mkfifo(frame_file.with_name("pipe"))
+    done = shell(f"timeout 60 {JFLNR} {line}", frame_file.parent)
+    assert done.returncode == 2 and done.stderr.count(b"\n") == 1
+
+
+# Where Python sees no signal, or whoever is called swallows it: as a compiler does.
+STUCK = """
+import time, jflnr.__main__, jflnr.cli
+from jflnr.files import replacing
+def stuck():
+    with replacing("out.exr"):
+        print("ready", flush=True)
+        while True:
+            try:
+                time.sleep(60)
+            except KeyboardInterrupt:
+                pass
+jflnr.cli.main = stuck
+raise SystemExit(jflnr.__main__.main())
+"""
+IMPORTING = "print('ready', flush=True)\nimport time\ntime.sleep(60)"
+
+
+@pytest.mark.parametrize("where", ["stuck", "importing"])
+def test_an_interruption_ends_it(tmp_path: Path, where: str) -> None:
+    (tmp_path / "modules" / "numpy").mkdir(parents=True)
+    (tmp_path / "folder").mkdir()
+    path = [str(Path(__file__).parents[2])]
+    command = [sys.executable, "-c", STUCK]
+    if where == "importing":
+        (tmp_path / "modules" / "numpy" / "__init__.py").write_text(IMPORTING)
+        path.insert(0, str(tmp_path / "modules"))
+        command = [sys.executable, "-m", "jflnr", "info", "x.exr"]
+    process = subprocess.Popen(
+        command,
+        cwd=tmp_path / "folder",
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"ready\n"
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said == b"jflnr: interrupted; no partial file is left\n"
+    assert not list((tmp_path / "folder").iterdir())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "report a.exr -o a.exr --overwrite",
+        "report a.exr -o link.exr --overwrite",
+        "report a.exr -o b.exr --reference b.exr --overwrite",
+        "fit a.exr -o a.exr --overwrite",
+        "train --data a.exr -o a.exr --overwrite",
+        "train --data b.exr --val a.exr -o a.exr --overwrite",
+        "train --data a.exr -o w.npz --finetune w.npz --overwrite",
+        "denoise a.exr -o out --temporal --history a.exr",
+        "denoise a.exr -o out --temporal --history out/a.exr",
+        "denoise a.exr -o p.exr --params p.exr --overwrite",
+    ],
+)
+def test_no_output_replaces_an_input(
+    tmp_path: Path,
+    frame_file: Path,
+    line: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    frame = frame_file.read_bytes()
+    names = ("a.exr", "b.exr", "w.npz", "p.exr")
+    for name in names:
+        (tmp_path / name).write_bytes(frame)
+    (tmp_path / "link.exr").hardlink_to(tmp_path / "a.exr")
+    monkeypatch.chdir(tmp_path)
+    assert main(line.split()) == 2
+    assert "would replace an input" in capsys.readouterr().err
+    assert all((tmp_path / name).read_bytes() == frame for name in names)
+
+
+def test_pictures_of_other_pixels_are_not_compared(
+    tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture
+) -> None:
+    channels = exr.read_channels(frame_file)
+    picture = {c: channels[f"reference.{c}"] for c in "RGB"}
+    for name, shift in (("a", 0), ("b", 500)):
+        exr.write_channels(tmp_path / f"{name}.exr", picture, window=exr.Window((shift, 0)))
+    a, b, out = (str(tmp_path / name) for name in ("a.exr", "b.exr", "out"))
+    for argv in (
+        ["metrics", a, b],
+        ["metrics", b, str(frame_file)],
+        ["report", a, b, "-o", out],
+        ["report", a, "--reference", b, "-o", out],
+        ["denoise", str(frame_file), "-o", f"{out}.exr", "--map=albedo=b.exr"],
+    ):
+        assert main(argv) == 2
+        assert "do not cover the same pixels" in capsys.readouterr().err
+    assert main(["metrics", a, a]) == 0

@@ -1,0 +1,50 @@
+"""Arrays of another kind, and a program around that has told JAX to be strict."""
+
+import contextlib
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr.frame import Frame
+
+SETTINGS = {
+    "wide": jax.enable_x64,
+    "ranks": lambda on: jax.numpy_rank_promotion("raise" if on else "allow"),
+    "types": lambda on: jax.numpy_dtype_promotion("strict" if on else "standard"),
+}
+METHODS = ("flr", "flr-adaptive", "bmfr")
+
+
+@pytest.mark.parametrize("backend", jflnr.BACKENDS)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("order", [">f4", ">f2", "<f8", ">f8"])
+def test_other_arrays(frame: Frame, method: str, backend: str, order: str) -> None:
+    if backend == "opencl":
+        pytest.importorskip("pyopencl")
+    half = jax.tree.map(lambda layer: np.asarray(layer, np.float16), frame)
+    right = jax.tree.map(lambda layer: layer.astype(order[1:].replace("8", "4")), half)
+    other = jax.tree.map(lambda layer: layer.astype(order), half)
+    wanted = jflnr.denoise(right, method, backend=backend)
+    found = jflnr.denoise(other, method, backend=backend)
+    np.testing.assert_array_equal(found, wanted, strict=True)
+    assert found.dtype == np.float32
+
+
+@pytest.mark.parametrize("backend", jflnr.BACKENDS)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("strict", [*SETTINGS, "all"])
+def test_strict_settings(frame: Frame, method: str, backend: str, strict: str) -> None:
+    if backend == "opencl":
+        pytest.importorskip("pyopencl")
+    frame = dataclasses.replace(frame, motion=np.zeros_like(frame.motion))
+    ways = [jflnr.Denoiser(method, backend=backend) for _ in range(2)]
+    wanted = [ways[0](frame), ways[0].next(frame), ways[0].next(frame)]
+    with contextlib.ExitStack() as stack:
+        for name, setting in SETTINGS.items():
+            stack.enter_context(setting(strict in (name, "all")))
+        found = [ways[1](frame), ways[1].next(frame), ways[1].next(frame)]
+    for image, right in zip(found, wanted, strict=True):
+        np.testing.assert_array_equal(image, right, strict=True)
