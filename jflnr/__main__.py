@@ -17,9 +17,12 @@ def main() -> int:
     """Run the process's own command line and return its exit code."""
     _open_streams()
     _watch()
-    from jflnr.cli import main as run
+    try:
+        from jflnr.cli import main as run
 
-    code = run()
+        code = run()
+    except KeyboardInterrupt:
+        _leave()
     if code == INTERRUPTED:  # what still runs may not stand that Python is taken down
         _leave("")
     return code
