@@ -2,14 +2,15 @@
 
 import os
 import signal
-import socket
 import sys
 import threading
 import time
+from types import FrameType
+from typing import NoReturn
 
 # How long the main thread may take to stop by itself, in seconds.
 PATIENCE = 1.0
-WORDS = "jflnr: interrupted; no partial file is left"
+INTERRUPTED = 130
 
 
 def main() -> int:
@@ -19,10 +20,12 @@ def main() -> int:
     try:
         from jflnr.cli import main as run
 
-        return run()
-    except KeyboardInterrupt:  # while importing
-        print(WORDS, file=sys.stderr)
-        return 130
+        code = run()
+    except KeyboardInterrupt:
+        _leave()
+    if code == INTERRUPTED:  # what still runs may not stand that Python is taken down
+        _leave("")
+    return code
 
 
 def _open_streams() -> None:
@@ -37,23 +40,40 @@ def _open_streams() -> None:
 
 def _watch() -> None:
     """Tell a thread of signals: a compiler keeps the main one from them, and may swallow them."""
-    told, listening = socket.socketpair()
-    told.setblocking(False)
-    signal.set_wakeup_fd(told.detach(), warn_on_full_buffer=False)
-    threading.Thread(target=_end, args=(listening,), daemon=True).start()
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return  # it is not to be interrupted
+    signal.signal(signal.SIGINT, _interrupt)
+    if sys.platform != "win32":  # where only a socket can be told
+        listening, told = os.pipe()
+        os.set_blocking(told, False)
+        signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+        threading.Thread(target=_end, args=(listening,), daemon=True).start()
 
 
-def _end(listening: socket.socket) -> None:
+def _interrupt(_: int, frame: FrameType | None) -> None:
+    """An exception, but for modules half imported: some turn it into another one, or crash."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            _leave()
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+def _end(listening: int) -> None:
     """Once there was a Ctrl-C, end the process if it does not end by itself."""
-    while listening.recv(1)[0] != signal.SIGINT:
+    while os.read(listening, 1)[0] != signal.SIGINT:
         pass
     time.sleep(PATIENCE)
+    _leave()
+
+
+def _leave(words: str = "jflnr: interrupted; no partial file is left\n") -> NoReturn:
+    """End the process at once, without a partial file."""
     files = sys.modules.get("jflnr.files")
     for path in list(getattr(files, "unfinished", ())):
         path.unlink(missing_ok=True)
-    if threading.main_thread().is_alive():  # else it has said so
-        os.write(2, f"{WORDS}\n".encode())
-    os._exit(130)
+    os.write(2, words.encode())
+    os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

@@ -34,17 +34,16 @@ def read(
     Raises `ValueError`, in one sentence, if it is no such file.
     """
     path = Path(path)
+    if not path.exists():
+        raise ValueError(f"{path}: there is no such file; it should be {wanted}")
     try:
         if unpacked_size(path) <= (path.stat().st_size if largest is None else largest):
             with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
-            if header := json_object(arrays.pop(HEADER).tobytes()):
-                return header, arrays
-    except FileNotFoundError:
-        raise ValueError(f"{path}: there is no such file; it should be {wanted}") from None
+            return json_object(arrays.pop(HEADER).tobytes()), arrays
     except Exception:  # damaged archives fail in many ways, some undocumented
         raise ValueError(f"{path}: not {wanted}, or damaged") from None
-    raise ValueError(f"{path}: unpacks to too much, or has no header; it should be {wanted}")
+    raise ValueError(f"{path}: unpacks to too much; it should be {wanted}")
 
 
 def restore(arrays: Mapping[str, np.ndarray], like: Any) -> Any:

@@ -186,7 +186,7 @@ Refusal = Callable[[Path, Path], list[object]]
     [
         (lambda shot, state: [shot, "--history", state, "--overwrite"], "delete it"),
         (lambda shot, state: [shot, "--history", state, "--method", "flr-adaptive"], "--method"),
-        (lambda shot, state: [shot, "--history", shot / NAMES[0]], "not a history"),
+        (lambda shot, state: [shot, "--history", shot / NAMES[0]], "would replace an input"),
         (lambda shot, state: [shot, "--history", state, "--block", "4"], "--block"),
         (lambda shot, state: [shot, "--history", state, "--backend", "opencl"], "jax backend"),
         (lambda shot, state: [shot, "--method", "auto"], "by themselves"),
@@ -267,9 +267,10 @@ def test_a_fitted_block_is_used_over_time(shot: Path, tmp_path: Path) -> None:
 def test_a_history_is_what_was_written(tmp_path: Path) -> None:
     state = {"a": np.arange(6.0).reshape(2, 3), "b": (np.int32(4), np.ones(2, np.float32))}
     path = tmp_path / "state.npz"
-    history.write(path, state, {"last": ["f.exr", 1]})
+    about = {"options": {}, "last": ["f.exr", 1], "header": {}}
+    history.write(path, state, about)
     found = history.read(path)
-    assert found.about == json.loads(json.dumps(found.about)) == {"last": ["f.exr", 1]}
+    assert found.about == json.loads(json.dumps(found.about)) == about
     again = found.state({"a": np.zeros((2, 3)), "b": (np.int32(0), np.zeros(2, np.float32))})
     np.testing.assert_array_equal(again["a"], state["a"])
     assert again["b"][0] == 4 and again["b"][1].dtype == np.float32

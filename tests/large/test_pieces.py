@@ -156,17 +156,3 @@ def test_larger_frames_come_in_smaller_pieces(method, gigabytes):
 def test_more_frames_at_once_leave_less_for_each():
     tile_for = functools.partial(memory.tile_for, 1080, 1920, 2 << 30, method=method_of("flr"))
     assert tile_for(at_once=1) is None and tile_for(at_once=3) > 0
-
-
-@pytest.mark.xfail(reason="frames are not padded to whole blocks", strict=True)
-def test_sizes_that_differ_by_less_than_a_block_share_a_program(rng):
-    whole = room(rng, 48, 64)
-    sizes = [(47, 60), (41, 57), (48, 63)]
-    frames = [jax.tree.map(lambda a, h=h, w=w: a[:h, :w], whole) for h, w in sizes]
-    before = denoising._whole._cache_size()
-    ours = [np.asarray(jflnr.denoise(frame)) for frame in frames]
-    assert denoising._whole._cache_size() == before + 1
-    # As an array of JAX it is not padded.
-    plain = np.asarray(jflnr.denoise(jax.tree.map(jnp.asarray, frames[1])))
-    assert [image.shape[:2] for image in ours] == sizes
-    assert relative(ours[1], plain) < RELATIVE

@@ -31,7 +31,7 @@ import numpy as np
 import jflnr
 from jflnr.opencl import NoDevice, flr
 image = np.random.default_rng(0).random((20, 30, 3), np.float32)
-parameters = jflnr.Parameters.of(12, 1e-3, 1e-4)
+parameters = jflnr.FLR(12, 1e-3, 1e-4)
 flr(image, image, parameters)
 if os.fork() == 0:
     try:
