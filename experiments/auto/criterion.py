@@ -8,7 +8,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jflnr.inputs import flr_images
 from scipy.ndimage import correlate1d
 
 import jflnr
@@ -96,7 +95,7 @@ def one(path: Path) -> dict[str, Any]:
 def sums_and_truth(path: Path, spp: int) -> tuple[criteria.Sums, criteria.Sums]:
     """Sums over blocks of one noisy layer, and of the reference in its place."""
     frame = jflnr.read_frame(path, spp=spp)
-    images = flr_images(frame, NAMES)
+    images = plain_images(frame, NAMES)
     shift = centre(images["guides"], images["weight"])
     found = []
     for light in (images["target"], frame.reference):
