@@ -73,5 +73,5 @@ def compare(before: str, after: str) -> None:
 
 
 if __name__ == "__main__":
-    command = {"record": record, "compare": compare}[sys.argv[1]]
-    command(*sys.argv[2:])
+    commands: dict[str, Callable[..., None]] = {"record": record, "compare": compare}
+    commands[sys.argv[1]](*sys.argv[2:])

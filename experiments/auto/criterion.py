@@ -16,6 +16,7 @@ from experiments.auto import ceiling, criteria
 from experiments.auto.ceiling import BLOCK, SIDES, rank
 from experiments.data import has
 from experiments.results import Parts, Row
+from jflnr.images.inputs import plain_images
 from jflnr.regression.blur import gaussian_taps
 from jflnr.regression.level import brightness
 from jflnr.regression.moments import centre, collect, index_xy
