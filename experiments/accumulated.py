@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Sequence
 from typing import Any
@@ -9,16 +10,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jflnr.inputs import adaptive_images, prepare
 
 from experiments import resume, shots, temporal_metrics
 from experiments.results import Parts, pivoted
+from jflnr import stages
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.regression import adaptive, energy, widths
 from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.apply import apply, with_borders
-from jflnr.regression.moments import centre
+from jflnr.stages import Known, Stage
 from jflnr.temporal import Average, Surface, accumulate, find_taps, reproject
 from jflnr.temporal.accumulate import nothing
 
@@ -38,8 +37,17 @@ VARIANTS = (
 )
 FOLLOWING = "input, output, following the light"
 SETTLED = 8
-# Side of the blocks of the finest models; frames are cut to whole blocks of pass 1.
-BLOCK = 4
+METHOD = AdaptiveFLR()
+# Frames are cut to whole blocks of pass 1.
+BLOCK = METHOD.finest
+# What the stages give that is averaged.
+PARTS = {
+    "nothing": (),
+    "input": ("target",),
+    "moments": ("light", "counted", "moments"),
+    "coefficients": ("models",),
+    "output": ("image",),
+}
 # Least share of a new frame; of a new output where what it was fitted to is an average already.
 LEAST, LEAST_OUTPUT = 0.05, 0.3
 
@@ -90,10 +98,11 @@ def whole_blocks(layer: Array) -> Array:
 
 def denoise(frames: Sequence[Frame], averaged: frozenset[str]) -> list[np.ndarray]:
     """Adaptive FLR with a history of what is named."""
-    (names, _), state, images = prepare(frames[0], None), start(frames[0]), []
-    shift = centre(adaptive_images(frames[0], names)["guides"])
+    names, _ = prepare(frames[0], None, METHOD)
+    known = METHOD.known(METHOD.images(frames[0], names))
+    state, images = start(frames[0]), []
     for frame in frames:
-        state, image = step(state, frame, shift, names, averaged)
+        state, image = step(state, frame, known, names, averaged)
         images.append(np.asarray(image))
     return images
 
@@ -106,11 +115,12 @@ def start(frame: Frame) -> State:
     h, w = height // BLOCK, width // BLOCK
     return {
         "surface": jax.tree.map(lambda layer: jnp.zeros(layer.shape), Surface.of(frame)),
-        "input": nothing(height, width, 3),
+        "target": nothing(height, width, 3),
         "light": nothing(h // 2, w // 2, products + guides + 1),
+        "counted": nothing(h // 2, w // 2, 2),
         "moments": nothing(h, w, products + 3 * (guides + 1) + 1),
-        "coefficients": nothing(h, w, 3 * (guides + 1)),
-        "output": nothing(height, width, 3),
+        "models": nothing(h, w, 3 * (guides + 2)),
+        "image": nothing(height, width, 3),
     }
 
 
@@ -118,45 +128,46 @@ def start(frame: Frame) -> State:
 def step(
     state: State,
     frame: Frame,
-    shift: jax.Array,
+    known: Known,
     names: tuple[str, ...],
     averaged: frozenset[str],
 ) -> tuple[State, jax.Array]:
-    """`flr_adaptive` with averages between its steps. shift: one for all frames."""
-    images, state = adaptive_images(frame, names), dict(state)
-    target, guides, weight = jnp.asarray(images["target"]), images["guides"], images["weight"]
-    weight = jnp.ones(target.shape[:2]) if weight is None else jnp.where(weight, 1.0, 0.0)
-    here, before, numbers = Surface.of(frame), state["surface"], AdaptiveFLR()
+    """`flr_adaptive` with averages between its stages. known: one for all frames."""
+    images, state = METHOD.images(frame, names), dict(state)
+    weight = images["weight"]
+    weight = jnp.ones(frame.depth.shape[:2]) if weight is None else jnp.where(weight, 1.0, 0.0)
+    here, before = Surface.of(frame), state["surface"]
+    kept = [name for some in averaged for name in PARTS[some]]
 
-    def average(name: str, image: jax.Array, block: int, least: float = LEAST) -> jax.Array:
-        state[name] = accumulate(moved(state[name], frame, before, block), image, least)
-        return state[name].mean
+    def average(parts: stages.Parts, name: str, side: int) -> Any:
+        planes = jnp.moveaxis(parts[name], -1, 0) if side == 1 else parts[name]
+        image = jnp.moveaxis(planes.reshape(-1, *planes.shape[-2:]), 0, -1)
+        again = name == "image" and len(averaged) > 1
+        past = moved(state[name], frame, before, side)
+        state[name] = accumulate(past, image, LEAST_OUTPUT if again else LEAST)
+        mean = state[name].mean
+        return mean if side == 1 else jnp.moveaxis(mean, -1, 0).reshape(planes.shape)
 
-    if "input" in averaged:
-        target = average("input", target, 1)
-        weight *= state["input"].samples[..., 0]
-    light = adaptive.collect_light(target, guides, shift, weight, BLOCK)
-    if "moments" in averaged:
-        light = to_planes(average("light", to_image(light), 2 * BLOCK))
-    mean = adaptive.frame_mean(light, shift.size)
-    models = adaptive.fit_pilot(light, mean, shift, numbers, BLOCK)
-    pilot = adaptive.Pilot(with_borders(models), mean)
-    grid = adaptive.collect_grid(target, guides, shift, pilot, weight, numbers, BLOCK)
-    if "moments" in averaged:
-        together = to_image(jnp.concatenate([grid.moments, grid.noise]))
-        planes = to_planes(average("moments", together, BLOCK))
-        # The mean of n frames has an n-th of the variance of one.
-        noise = planes[-1:] / to_planes(state["moments"].samples)
-        grid = grid._replace(moments=planes[:-1], noise=noise)
-    levels = widths.fit_levels(grid, shift, 3, adaptive.LEVELS, mean, numbers)
-    models = energy.restore(widths.merged_models(*levels), light, shift.size, numbers.slack)
-    if "coefficients" in averaged:
-        flat = to_image(models.reshape(-1, *models.shape[2:]))
-        models = to_planes(average("coefficients", flat, BLOCK)).reshape(models.shape)
-    image = apply(models, guides, shift, BLOCK)
-    if "output" in averaged:
-        image = average("output", image, 1, LEAST if len(averaged) == 1 else LEAST_OUTPUT)
-    return state | {"surface": here}, image
+    def averaging(stage: Stage) -> Stage:
+        def with_history(method: Any, parts: stages.Parts, known: Known) -> stages.Parts:
+            given = stage.run(method, parts, known)
+            sides = dict(stage.gives + stage.totals)
+            given |= {name: average(given, name, sides[name]) for name in kept if name in given}
+            if "moments" in kept and "moments" in given:
+                # The mean of n frames has an n-th of the variance of one.
+                noise = given["moments"][-1] / state["moments"].samples[..., 0]
+                given["moments"] = given["moments"].at[-1].set(noise)
+            return given
+
+        return dataclasses.replace(stage, run=with_history)
+
+    if "target" in kept:
+        images["target"] = average({"target": jnp.asarray(images["target"])}, "target", 1)
+        weight *= state["target"].samples[..., 0]
+    parts, _ = stages.run(
+        [averaging(stage) for stage in METHOD.stages()], METHOD, images | {"weight": weight}, known
+    )
+    return state | {"surface": here}, parts["image"]
 
 
 def moved(average: Average, frame: Frame, before: Surface, block: int) -> Average:
@@ -167,11 +178,3 @@ def moved(average: Average, frame: Frame, before: Surface, block: int) -> Averag
         (frame.motion, Surface.of(frame), before),
     )
     return reproject(average, find_taps(motion / block, *surfaces, off_plane=0.01 * block))
-
-
-def to_image(planes: jax.Array) -> jax.Array:
-    return jnp.moveaxis(planes, 0, -1)
-
-
-def to_planes(image: jax.Array) -> jax.Array:
-    return jnp.moveaxis(image, -1, 0)

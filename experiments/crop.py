@@ -7,29 +7,25 @@ number is the one under which the two agree best; all others are taken from the 
 
 from __future__ import annotations
 
-import functools
+import dataclasses
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jflnr.inputs import adaptive_images, flr_images
 
-from jflnr.denoising import Part, denoise_flr, support_of
 from jflnr.frame import Frame
 from jflnr.large.scanlines import Scanlines
-from jflnr.large.source import Rows, scene_of, shift_of
-from jflnr.regression import adaptive, energy, widths
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.apply import apply, with_borders
-from jflnr.regression.floor import with_own_light
-from jflnr.regression.flr import DEFAULT
-from jflnr.regression.level import mean_guides
+from jflnr.large.source import Rows, scene_of
+from jflnr.large.tiled import Job, sparse_images
+from jflnr.methods import method_of
+from jflnr.regression.adaptive import light_of
+from jflnr.stages import run
 
 NAMES = ("normal", "depth", "ao")
 LAYERS = {*NAMES, "indirect", "mask"}
-BLOCK = 8
 # Pixels on a side that are compared, and on all sides of them that the windows may reach.
 SIDE, MARGIN = 256, 1024
 # Rows that are read at a time.
@@ -44,14 +40,12 @@ def difference(source: Path, output: Path, method: str, corner: tuple[int, int])
     """
     rows = Scanlines(source, 1, {}).rows(LAYERS)
     low, start = [_around(place, MARGIN) for place in corner], SIDE // 2
-    frame = _cut(rows, low)
     inner = tuple(
         slice(place - start - first, place + start - first)
         for place, first in zip(corner, low, strict=True)
     )
     light = _light(output, corner)
-    crop = functools.partial({"flr": _flr, "flr-adaptive": _adaptive}[method], rows, frame)
-    ours = crop(inner, light)
+    ours = _denoised(rows, _cut(rows, low), method, inner, light)
     norm = float(np.linalg.norm(ours - light) / np.linalg.norm(ours))
     return {"difference": norm, "largest": float(np.abs(ours - light).max() / ours.mean())}
 
@@ -80,23 +74,22 @@ def _light(output: Path, corner: tuple[int, int]) -> np.ndarray:
     return np.stack([channels[f"indirect.{c}"][:, left : left + SIDE] for c in "RGB"], axis=-1)
 
 
-def _flr(rows: Rows, frame: Frame, inner: tuple[slice, ...], light: np.ndarray) -> np.ndarray:
-    scene = scene_of(rows)
-
-    def images(frame: Frame) -> tuple[Any, Any]:
-        found = flr_images(frame, NAMES, scene)
-        return found["guides"], found["weight"]
-
-    part = Part(support_of(DEFAULT, max(rows.height, rows.width)), scene, shift_of(rows, images))
-    return np.asarray(denoise_flr(frame, DEFAULT, NAMES, BLOCK, "jax", part))[inner]
-
-
-def _adaptive(rows: Rows, frame: Frame, inner: tuple[slice, ...], light: np.ndarray) -> np.ndarray:
-    scene = scene_of(rows)
-    images = jax.jit(lambda frame: adaptive_images(frame, NAMES, scene))
-    shift = shift_of(rows, lambda frame: (images(frame)["guides"], None))
-    fitted = _fit(images(frame), shift, jnp.float32(_mean(rows)))
-    at = lambda rate: np.asarray(_evaluate(fitted, images(frame), shift, rate))[inner]
+def _denoised(
+    rows: Rows, frame: Frame, name: str, inner: tuple[slice, ...], light: np.ndarray
+) -> np.ndarray:
+    """`inner` of the frame, under the rate of brightness given back that comes nearest `light`."""
+    scene, method = scene_of(rows), method_of(name).for_frame(rows.shapes(), NAMES)
+    known = method.known(sparse_images(Job(rows, method, NAMES, scene, 0, None, ExitStack())))
+    images = method.images(frame, NAMES, scene)
+    # Nothing is learned from the crop.
+    *stages, last = [dataclasses.replace(stage, learn=None) for stage in method.stages()]
+    if name != "flr":
+        known |= {"mean": jnp.float32(_mean(rows)) / known["unit"]}
+    parts, _ = jax.jit(lambda images, known: run(stages, method, images, known))(images, known)
+    evaluate = jax.jit(lambda parts, known: last.run(method, parts, known)["image"])
+    at = lambda rate: np.asarray(evaluate(parts, known | {"rate": rate}))[inner]
+    if name == "flr":
+        return at(jnp.float32(0))
     plain, rate = at(jnp.float32(0)), jnp.float32(0.01)
     # Nearly linear in the rate.
     for _ in range(3):
@@ -110,31 +103,7 @@ def _mean(rows: Rows) -> float:
     total = count = 0.0
     for row in range(0, rows.height, BAND):
         frame = rows.read(row, min(row + BAND, rows.height))
-        brightness = np.asarray(adaptive.light_of(jnp.asarray(frame.indirect)), np.float64)
+        brightness = np.asarray(light_of(jnp.asarray(frame.indirect)), np.float64)
         used = frame.mask[..., 0] > 0 if frame.mask is not None else np.isfinite(brightness)
         total, count = total + float(brightness[used].sum()), count + float(used.sum())
     return total / count
-
-
-@jax.jit
-def _fit(images: dict[str, Any], shift: jax.Array, mean: jax.Array) -> tuple[jax.Array, ...]:
-    """As `adaptive.fit_frame`: models, the brightness that they give, mean guides of the blocks."""
-    numbers, block, guides = AdaptiveFLR(), BLOCK // 2, shift.size
-    target, x, weight = images["target"], images["guides"], images["weight"]
-    moments = adaptive.collect_light(target, x, shift, weight, block)
-    models = with_borders(adaptive.fit_pilot(moments, mean, shift, numbers, block))
-    pilot = adaptive.Pilot(models, mean)
-    grid = adaptive.collect_grid(target, x, shift, pilot, weight, numbers, block)
-    levels = widths.fit_levels(grid, shift, target.shape[-1], adaptive.LEVELS, mean, numbers)
-    found = widths.merged_models(*levels)
-    return found, energy.block_light(found, moments, guides), mean_guides(grid.moments, guides)
-
-
-@jax.jit
-def _evaluate(
-    fitted: tuple[jax.Array, ...], images: dict[str, Any], shift: jax.Array, rate: jax.Array
-) -> jax.Array:
-    models, brightness, guides = fitted
-    models = with_own_light(energy.scale(models, brightness, rate), guides)
-    floor = AdaptiveFLR().floor
-    return apply(models, images["guides"], shift, BLOCK // 2, floor)

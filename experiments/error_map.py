@@ -49,7 +49,7 @@ def one(path: Path, spp: int) -> dict[str, float]:
 def errors(path: Path, spp: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """True error of the brightness, the standard error told, and where there is a surface."""
     frame = jflnr.read_frame(path, spp=spp)
-    image, error = jflnr.denoise_with_error(frame)
+    image, error = jflnr.denoise(frame, "flr-adaptive", with_error=True)
     off = np.abs((np.asarray(image) - frame.reference) @ LUMINANCE)
     return off, np.asarray(error)[..., 0], np.asarray(frame.mask)[..., 0] > 0
 

@@ -15,7 +15,7 @@ from typing import Any
 from experiments import mosaic
 from experiments.results import Parts
 from jflnr.cli import parser
-from jflnr.cli.frames import Denoiser, failure
+from jflnr.cli.frames import Worker, failure
 from jflnr.cli.jobs import Job, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
@@ -53,9 +53,9 @@ def _write_shot(folder: Path, count: int, height: int, width: int) -> None:
         mosaic.write(folder / f"{number:04}.exr", height, width, first=number)
 
 
-def _denoiser(*options: str) -> Denoiser:
+def _denoiser(*options: str) -> Worker:
     arguments = parser().parse_args(["denoise", "none", "-o", "none", "--overwrite", *options])
-    return Denoiser(settings_of(arguments), arguments, None, 3)
+    return Worker(settings_of(arguments), arguments, None, 3)
 
 
 def _pipeline(shot: Path, method: str, backend: str) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from typing import Any
 from experiments import crop, folders, mosaic, plots, resume
 from experiments.results import Parts
 from jflnr.large import memory
+from jflnr.methods import method_of
+from jflnr.regression.flr import FLR
 
 NAME = "large"
 QUESTION = "What do large frames and folders of frames take, in memory and in time?"
@@ -68,7 +70,7 @@ def _largest(folder: Path, method: str) -> dict[str, Any]:
     """The largest frame in pieces, and a crop of it around a place where these meet."""
     source, output = _mosaic(folder, *LARGEST), folder / "out.exr"
     found = _denoised(source, output, method, LARGEST_MEMORY)
-    tile = memory.tile_for(*LARGEST, memory.parse(LARGEST_MEMORY), method=method)
+    tile = memory.tile_for(*LARGEST, memory.parse(LARGEST_MEMORY), 1, method_of(method))
     assert tile is not None
     found |= crop.difference(source, output, method, seam(method, tile))
     return {"method": method, "megapixels": LARGEST[0] * LARGEST[1] / 1e6, **found}
@@ -78,7 +80,7 @@ def seam(method: str, tile: int) -> tuple[int, int]:
     """Row and column, near the middle of the largest frame, where pieces meet."""
     height, width = LARGEST
     if method == "flr":
-        strip = -(-(tile * tile // width) // crop.BLOCK) * crop.BLOCK
+        strip = -(-(tile * tile // width) // FLR.block) * FLR.block
         return height // 2 // strip * strip, width // 2
     return height // 2 // tile * tile, width // 2 // tile * tile
 

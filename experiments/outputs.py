@@ -9,57 +9,39 @@ from __future__ import annotations
 import dataclasses
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 import jflnr
 from experiments import data
+from experiments.shots import SPATIAL
 
-SPATIAL = ("flr", "flr-adaptive", "flnr", "flnr-small", "flnr-tiny")
 REPEATS = 5
 
 
 def cases(frame: jflnr.Frame, later: jflnr.Frame) -> Iterator[tuple[str, Callable[[], Any]]]:
     """Name and call of everything that a user can ask for."""
-    for method in (*SPATIAL, "bmfr", "auto"):
+    for method in jflnr.METHODS:
         for backend in ("jax", "opencl") if method != "auto" else ("jax",):
             yield (
                 f"{method} {backend} whole",
-                lambda m=method, b=backend: jflnr.denoise(frame, m, backend=b),
+                partial(jflnr.denoise, frame, method, backend=backend),
             )
     for method, backend in [("flr", "opencl"), *((m, "jax") for m in SPATIAL)]:
-        yield (
-            f"{method} {backend} tiles",
-            lambda m=method, b=backend: jflnr.denoise(frame, m, backend=b, tile=160),
-        )
+        denoiser = jflnr.Denoiser(method, backend=backend, tile=160)
+        yield f"{method} {backend} tiles", partial(denoiser, frame)
     for method in (*SPATIAL, "bmfr"):
-        for backend in ("jax", "opencl"):
-            yield (
-                f"{method} {backend} sequence",
-                lambda m=method, b=backend: _sequence(m, b, [frame, later, frame]),
-            )
+        for backend in jflnr.BACKENDS:
+            shot = frame, later, frame
+            yield f"{method} {backend} sequence", partial(_last, method, backend, shot)
 
 
-def _sequence(method: str, backend: str, frames: list[jflnr.Frame]) -> Any:
-    from jflnr import opencl, temporal
-    from jflnr.opencl import bmfr as opencl_bmfr
-    from jflnr.opencl import temporal as opencl_temporal
-    from jflnr.temporal import bmfr
-
-    home = {
-        ("bmfr", "jax"): bmfr,
-        ("bmfr", "opencl"): opencl_bmfr,
-        ("jax",): temporal,
-        ("opencl",): opencl_temporal,
-    }[(method, backend) if method == "bmfr" else (backend,)]
-    assert opencl
-    options = {} if method == "bmfr" else {"method": method}
-    state = home.start(frames[0])
-    for frame in frames:
-        state, image = home.step(state, frame, **options)
-    return image
+def _last(method: str, backend: str, frames: Sequence[jflnr.Frame]) -> np.ndarray:
+    denoiser = jflnr.Denoiser(method, backend=backend)
+    return [denoiser.next(frame) for frame in frames][-1]
 
 
 def record(path: str) -> None:
@@ -77,7 +59,7 @@ def record(path: str) -> None:
             times.append(time.perf_counter() - start)
         found[f"{name} seconds"] = np.array([times[0], np.median(times[1:])])
         print(f"{name}: {times[0]:.2f} s, then {np.median(times[1:]):.3f} s", flush=True)
-    np.savez(path, **found)
+    np.savez(path, **found)  # type: ignore[arg-type]
 
 
 def compare(before: str, after: str) -> None:
@@ -91,5 +73,5 @@ def compare(before: str, after: str) -> None:
 
 
 if __name__ == "__main__":
-    command = {"record": record, "compare": compare}[sys.argv[1]]
-    command(*sys.argv[2:])
+    commands: dict[str, Callable[..., None]] = {"record": record, "compare": compare}
+    commands[sys.argv[1]](*sys.argv[2:])

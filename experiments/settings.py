@@ -11,7 +11,6 @@ import numpy as np
 import jflnr
 from experiments.methods import Method, backends
 from jflnr.frame import Frame
-from jflnr.regression.flr import DEFAULT, FLR
 
 GUIDES = (("normal", "depth"), ("normal", "depth", "ao", "position"))
 
@@ -20,9 +19,7 @@ def flr_settings() -> list[Method]:
     """Block, guides, sigma, precision, on every backend; the default itself is left out."""
     options: dict[str, dict[str, Any]] = {f"block {b}": {"block": b} for b in (1, 2, 4, 16, 32)}
     options |= {f"guides {'+'.join(names)}": {"guides": names} for names in GUIDES}
-    for sigma in (8.0, 24.0):
-        changed = FLR(sigma, float(DEFAULT.eps), float(DEFAULT.eps_prime))
-        options[f"sigma {sigma:g}"] = {"parameters": changed}
+    options |= {f"sigma {sigma:g}": {"sigma": sigma} for sigma in (8.0, 24.0)}
     found = []
     for backend in backends():
         suffix = "" if backend == "jax" else f" ({backend})"

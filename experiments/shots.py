@@ -15,12 +15,14 @@ import jflnr
 from experiments import data
 from experiments.methods import oidn_peers
 from experiments.peers import svgf
-from jflnr import temporal
+from jflnr.bmfr.pipeline import BMFR
 from jflnr.cli.jobs import expand
 from jflnr.frame import Array, Frame
-from jflnr.temporal import bmfr, sequence
 
 Step = Callable[[Any, Frame], tuple[Any, Array]]
+
+# Our spatial methods, which all work with a history.
+SPATIAL = tuple(name for name in jflnr.METHODS if name not in ("bmfr", "auto"))
 
 
 @dataclass(frozen=True)
@@ -91,10 +93,11 @@ def methods() -> list[Method]:
         for m in ("flr", "flr-adaptive", "flnr")
     ]
     tuned = functools.partial(svgf.step, **svgf.TUNED_OVER_TIME)
-    ours = [Method(f"{m}, temporal", "ours", with_history(m)) for m in sequence.METHODS]
+    ours = [Method(f"{m}, temporal", "ours", with_history(m)) for m in SPATIAL]
     peers = [
-        Method("BMFR", "peer", in_steps(bmfr.start, bmfr.step)),
-        Method("BMFR without TAA", "peer", in_steps(bmfr.start, without_taa)),
+        Method("BMFR", "peer", with_history("bmfr")),
+        # TAA smooths the edges of textures, which the references have.
+        Method("BMFR without TAA", "peer", with_history(BMFR(picture_share=1.0))),
         Method("SVGF", "peer", in_steps(svgf.start, svgf.step)),
         Method("SVGF, tuned", "peer", in_steps(svgf.start, tuned)),
     ]
@@ -106,19 +109,19 @@ def methods() -> list[Method]:
     return [*alone, *ours, *peers, *oidn]
 
 
-def without_taa(history: bmfr.History, frame: Frame) -> tuple[bmfr.History, Array]:
-    """BMFR's step up to its last. TAA smooths the edges of textures, which the references have."""
-    return bmfr.step(history, frame, bmfr.PAPER._replace(picture_share=1.0))
-
-
 def each(denoise: Callable[[Frame], Array], frames: Sequence[Frame]) -> list[np.ndarray]:
     """Frame by frame, by a method that knows of no other frame."""
     return [np.asarray(denoise(frame)) for frame in frames]
 
 
-def with_history(method: str) -> Callable[[Sequence[Frame]], list[np.ndarray]]:
-    """One of ours, over time."""
-    return in_steps(temporal.start, functools.partial(temporal.step, method=method))
+def with_history(method: Any) -> Callable[[Sequence[Frame]], list[np.ndarray]]:
+    """A method of jflnr, by name or as an object, over time."""
+
+    def run(frames: Sequence[Frame]) -> list[np.ndarray]:
+        denoiser = jflnr.Denoiser(method)
+        return [np.asarray(denoiser.next(frame)) for frame in frames]
+
+    return run
 
 
 def in_steps(

@@ -15,17 +15,17 @@ from experiments import data
 from experiments.methods import backends
 from experiments.peers import guided, svgf
 from experiments.results import Parts, Row
-from experiments.shots import made_up
+from experiments.shots import SPATIAL, made_up
 from experiments.timing import interleaved
-from jflnr import opencl, temporal
+from jflnr import opencl
+from jflnr.bmfr.fit import fit
 from jflnr.frame import Frame
 from jflnr.images.guides import layers
-from jflnr.network import weights
+from jflnr.network.flnr import FLNR
 from jflnr.opencl.context import default_context
 from jflnr.opencl.profile import profile
 from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.flr import DEFAULT, flr
-from jflnr.temporal import bmfr, bmfr_fit, sequence
 
 NAME = "speed"
 QUESTION = "What does a frame take, against the memory floor and others, and how does it grow?"
@@ -41,7 +41,7 @@ OIDN: dict[str, dict[str, Any]] = {
 OPENCL: dict[str, tuple[Callable[..., Any], Any]] = {
     "flr": (opencl.flr, DEFAULT),
     "flr-adaptive": (opencl.flr_adaptive, AdaptiveFLR()),
-    "flnr": (opencl.flnr, weights.shipped("flnr")),
+    "flnr": (opencl.flnr, FLNR()),
 }
 
 
@@ -156,7 +156,7 @@ _flr = jax.jit(flr)
 @jax.jit
 def _bmfr(y: jax.Array, x: jax.Array) -> jax.Array:
     surface = jnp.ones_like(y[..., :1], bool)
-    return bmfr_fit.fit(y, x, surface, 0, jnp.zeros(2, int))
+    return fit(y, x, surface, 0, jnp.zeros(2, int))
 
 
 @jax.jit
@@ -192,7 +192,8 @@ def enlarge(frame: jflnr.Frame, height: int, width: int) -> jflnr.Frame:
 def over_time(height: int, width: int) -> dict[str, Callable[[], Any]]:
     """Name to a call that denoises the second frame of a sequence."""
     before, now = (enlarge(frame, height, width) for frame in made_up(2).frames)
-    return by_kernels(before, now) | by_jax(before, now)
+    kernels = of_ours("OpenCL", before, now) if "opencl" in backends() else {}
+    return kernels | by_jax(before, now)
 
 
 def by_jax(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
@@ -201,30 +202,26 @@ def by_jax(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
     target = np.zeros_like(source)
     found: dict[str, Callable[[], Any]] = {"memory floor": lambda: np.copyto(target, source)}
     frames = [jax.tree.map(jnp.asarray, frame) for frame in (before, now)]
-    for method in sequence.METHODS:
-        step = functools.partial(temporal.step, method=method)
-        found[f"{method}, temporal, JAX"] = second(temporal.start, step, *frames)
-    found["BMFR, JAX"] = second(bmfr.start, bmfr.step, *frames)
-    return found | {"SVGF, JAX": second(svgf.start, svgf.step, *frames)}
+    found |= of_ours("JAX", *frames)
+    state, _ = svgf.step(svgf.start(frames[0]), frames[0])
+    step = functools.partial(svgf.step, jax.block_until_ready(state), frames[1])
+    return found | {"SVGF, JAX": functools.partial(finished, step)}
 
 
-def by_kernels(before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
-    """The same by the kernels, if there is a device."""
-    found: dict[str, Callable[[], Any]] = {}
-    if "opencl" in backends():
-        from jflnr.opencl import bmfr as bmfr_kernels
-        from jflnr.opencl import temporal as kernels
-
-        for method in sequence.METHODS:
-            step = functools.partial(kernels.step, method=method)
-            found[f"{method}, temporal, OpenCL"] = second(kernels.start, step, before, now)
-        found["BMFR, OpenCL"] = second(bmfr_kernels.start, bmfr_kernels.step, before, now)
-    return found
+def of_ours(backend: str, before: Frame, now: Frame) -> dict[str, Callable[[], Any]]:
+    """Name to a call that denoises `now` after `before`, on one back end."""
+    names = {f"{method}, temporal": method for method in SPATIAL} | {"BMFR": "bmfr"}
+    return {f"{name}, {backend}": second(m, backend, before, now) for name, m in names.items()}
 
 
-def second(
-    start: Callable[[Frame], Any], step: Callable[..., Any], before: Frame, now: Frame
-) -> Callable[[], Any]:
-    """A call of the step from the first frame to the second."""
-    state = jax.block_until_ready(step(start(before), before)[0])
-    return functools.partial(finished, functools.partial(step, state, now))
+def second(method: str, backend: str, before: Frame, now: Frame) -> Callable[[], Any]:
+    """A call from the first frame to the second, which begins at the same state every time."""
+    denoiser = jflnr.Denoiser(method, backend=backend.lower())
+    denoiser.next(before)
+    state = denoiser.state
+
+    def call() -> Any:
+        denoiser.state = state
+        return finished(functools.partial(denoiser.next, now))
+
+    return call

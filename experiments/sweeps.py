@@ -21,8 +21,6 @@ from experiments.tune import quick_psnr
 from jflnr import metrics
 from jflnr.frame import Array, Frame
 from jflnr.images.guides import shrink
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.flr import DEFAULT, FLR
 
 
 @dataclass(frozen=True)
@@ -135,8 +133,7 @@ def _settings() -> list[Case]:
 
 def flr_of_sigma(sigma: float) -> Method:
     """FLR with another window."""
-    changed = FLR(sigma, float(DEFAULT.eps), float(DEFAULT.eps_prime))
-    return method(f"flr, sigma {sigma:g}", parameters=changed)
+    return method(f"flr, sigma {sigma:g}", sigma=float(sigma))
 
 
 # Independent streams of the files that together make so many samples per pixel.
@@ -319,10 +316,7 @@ WITHOUT: dict[str, dict[str, Any]] = {
 
 
 def _ablation() -> list[Case]:
-    methods = [
-        method(name, method="flr-adaptive", parameters=AdaptiveFLR(**numbers))
-        for name, numbers in WITHOUT.items()
-    ]
+    methods = [method(name, method="flr-adaptive", **numbers) for name, numbers in WITHOUT.items()]
     exact = method("energy kept exactly", method="flr-adaptive", keep_energy=True)
     methods += [exact, method("flr"), *map(flr_of_sigma, (5, 8, 12, 16, 24, 40)), *oidn_settings()]
     cases = []
@@ -337,9 +331,8 @@ def _regularisation() -> list[Case]:
     cases = []
     for eps in values:
         for prime in values:
-            chosen = FLR(float(DEFAULT.sigma), eps, prime)
             labels = {"form": "normalised", "eps": eps, "eps_prime": prime}
-            cases.append(Case(labels, method("flr", parameters=chosen)))
+            cases.append(Case(labels, method("flr", eps=eps, eps_prime=prime)))
         plain = Method("Tikhonov", "Tikhonov", tikhonov.denoise, {"eps": eps})
         cases.append(Case({"form": "Tikhonov", "eps": eps, "eps_prime": 0.0}, plain))
     return cases

@@ -8,7 +8,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jflnr.inputs import flr_images
 from scipy.ndimage import correlate1d
 
 import jflnr
@@ -17,6 +16,7 @@ from experiments.auto import ceiling, criteria
 from experiments.auto.ceiling import BLOCK, SIDES, rank
 from experiments.data import has
 from experiments.results import Parts, Row
+from jflnr.images.inputs import plain_images
 from jflnr.regression.blur import gaussian_taps
 from jflnr.regression.level import brightness
 from jflnr.regression.moments import centre, collect, index_xy
@@ -96,7 +96,7 @@ def one(path: Path) -> dict[str, Any]:
 def sums_and_truth(path: Path, spp: int) -> tuple[criteria.Sums, criteria.Sums]:
     """Sums over blocks of one noisy layer, and of the reference in its place."""
     frame = jflnr.read_frame(path, spp=spp)
-    images = flr_images(frame, NAMES)
+    images = plain_images(frame, NAMES)
     shift = centre(images["guides"], images["weight"])
     found = []
     for light in (images["target"], frame.reference):

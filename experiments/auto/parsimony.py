@@ -18,6 +18,10 @@ from experiments.resume import ROOT
 from experiments.timing import interleaved
 from jflnr.auto.method import denoise_on_blocks, plan_of
 from jflnr.auto.plan import BLOCKS
+from jflnr.frame import Array, Frame
+from jflnr.images.guides import layers
+from jflnr.metrics import measure
+from jflnr.regression.flr import DEFAULT, flr
 
 NAME = "auto-parsimony"
 

@@ -1,6 +1,6 @@
 """Blockwise Multi-Order Feature Regression (Koskela et al. 2019), its single-frame form.
 
-No temporal accumulation and no TAA: the regression of jflnr/temporal/bmfr_fit.py, on features that
+No temporal accumulation and no TAA: the regression of jflnr/bmfr/fit.py, on features that
 can be chosen, with several grids of blocks averaged.
 """
 
@@ -11,8 +11,8 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jflnr.temporal.bmfr_fit import fit
 
+from jflnr.bmfr.fit import fit
 from jflnr.frame import Array, Frame
 from jflnr.images.guides import layers
 

@@ -6,16 +6,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jflnr.denoising import BLOCK
 from jflnr.frame import Array, Frame
 from jflnr.images import guides
 from jflnr.regression.apply import apply
 from jflnr.regression.blur import blur
+from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.flr import DEFAULT
 from jflnr.regression.moments import collect, index_xx, index_xy
-from jflnr.regression.solve import cholesky_solve
 
-SUPPORT = 72
+BLOCK, SUPPORT = DEFAULT.block, 72
 
 
 def denoise(frame: Frame, *, eps: float) -> Array:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 import jflnr
 from experiments import plots, shots
-from jflnr.bmfr import pipeline as bmfr
 from jflnr.bmfr.pipeline import BMFR
 from jflnr.metrics import display, exposure
 
@@ -34,24 +32,21 @@ def stages(frames: Sequence[jflnr.Frame]) -> dict[str, np.ndarray]:
     """Pictures of the indirect light, NaN in magenta."""
     first, last = frames[0], frames[-1]
     lights: dict[str, tuple[jflnr.Frame, Any]] = {"1 sample per pixel": (last, last.indirect)}
-    raw = bmfr.PAPER._replace(noise=0.0)
-    lights["first frame, without noise on features"] = first, after([first], raw)
-    lights["first frame"] = first, after([first], bmfr.PAPER)
+    lights["first frame, without noise on features"] = first, after([first], BMFR(noise=0.0))
+    lights["first frame"] = first, after([first], BMFR())
     lights[f"after {len(frames)} frames, without TAA"] = (
         last,
-        after(frames, bmfr.PAPER._replace(picture_share=1.0)),
+        after(frames, BMFR(picture_share=1.0)),
     )
-    lights[f"after {len(frames)} frames"] = last, after(frames, bmfr.PAPER)
+    lights[f"after {len(frames)} frames"] = last, after(frames, BMFR())
     lights["reference"] = last, last.reference
     return {name: shown(frame, np.asarray(light)) for name, (frame, light) in lights.items()}
 
 
-def after(frames: Sequence[jflnr.Frame], parameters: BMFR) -> jax.Array:
+def after(frames: Sequence[jflnr.Frame], method: BMFR) -> Any:
     """The image of the last frame."""
-    history = bmfr.start(frames[0])
-    for frame in frames:
-        history, image = bmfr.step(history, frame, parameters)
-    return image
+    denoiser = jflnr.Denoiser(method)
+    return [denoiser.next(frame) for frame in frames][-1]
 
 
 def shown(frame: jflnr.Frame, light: np.ndarray) -> np.ndarray:

@@ -9,7 +9,6 @@ import numpy as np
 
 import jflnr
 from experiments import data, plots
-from jflnr.denoising import BLOCK
 from jflnr.images import guides
 from jflnr.metrics import display, exposure
 from jflnr.regression.apply import apply
@@ -18,7 +17,7 @@ from jflnr.regression.flr import DEFAULT
 from jflnr.regression.moments import centre, collect, index_xy
 from jflnr.regression.solve import solve
 
-SUPPORT = 72
+BLOCK, SUPPORT = DEFAULT.block, 72
 
 
 def arrays() -> dict[str, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,11 +12,10 @@ import numpy as np
 
 from experiments.stability import solvers
 from experiments.stability.cases import Case, Type
-from jflnr.network.flnr import flnr
-from jflnr.network.weights import shipped
+from jflnr.bmfr.fit import fit
+from jflnr.network.flnr import FLNR, flnr
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.flr import DEFAULT, flr
-from jflnr.temporal import bmfr_fit
 
 BLOCK = 8
 SUPPORT = 96  # covers the whole of a small frame, as the truth does
@@ -47,7 +45,7 @@ def by_numpy(solver: Callable[[solvers.Window], np.ndarray], case: Case, dtype: 
 def _weights(size: int, block: int) -> np.ndarray:
     """Gaussian weight of every pixel for every block, along one axis: `(blocks, size)`."""
     distance = np.arange(-(-size // block))[:, None] - np.arange(size) // block
-    return np.exp(-0.5 * (distance * block / math.exp(DEFAULT.log_sigma)) ** 2)
+    return np.exp(-0.5 * (distance * block / float(DEFAULT.sigma)) ** 2)
 
 
 def _bilinear(size: int) -> np.ndarray:
@@ -105,9 +103,8 @@ def by_adaptive(case: Case, dtype: Type) -> np.ndarray:
 
 @functools.cache
 def _flnr() -> Callable[..., jax.Array]:
-    params = shipped("flnr")
     return unoptimised(
-        lambda y, x, usable: flnr(jnp.repeat(y, 3, axis=-1), x, params, weight=usable)
+        lambda y, x, usable: flnr(jnp.repeat(y, 3, axis=-1), x, FLNR(), weight=usable)
     )
 
 
@@ -118,7 +115,7 @@ def by_flnr(case: Case, dtype: Type) -> np.ndarray:
 
 @jax.jit
 def _bmfr(y: jax.Array, x: jax.Array, usable: jax.Array) -> jax.Array:
-    return bmfr_fit.fit(y, x, usable[..., None], 3, jnp.array([5, 7]))
+    return fit(y, x, usable[..., None], 3, jnp.array([5, 7]))
 
 
 def by_bmfr(case: Case, dtype: Type) -> np.ndarray:

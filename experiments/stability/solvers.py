@@ -6,7 +6,6 @@ Each takes a `Window` and returns the models `(B, Q + 1, C)` of its B blocks, fo
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -16,8 +15,7 @@ from jflnr.regression.flr import DEFAULT
 
 TIKHONOV = 1e-6
 NOISE = 0.01  # amplitude of BMFR's stochastic regularisation, of guides scaled to [-1, 1]
-# Parameters' own properties are of float32.
-EPS, EPS_PRIME = math.exp(DEFAULT.log_eps), math.exp(DEFAULT.log_eps_prime)
+EPS, EPS_PRIME = float(DEFAULT.eps), float(DEFAULT.eps_prime)
 
 
 class Window(NamedTuple):

@@ -8,7 +8,6 @@ from typing import Any
 
 import jax
 import numpy as np
-from jflnr.inputs import frame_inputs
 
 from experiments import data, noise, resume
 from experiments.results import Parts, pivoted

@@ -12,7 +12,7 @@ import numpy as np
 from experiments import data, resume
 from experiments.results import Parts
 from experiments.training import shared
-from jflnr.network import loss, regression
+from jflnr.network import flnr, loss
 from jflnr.network.adam import Adam
 from jflnr.network.train import CONFIGS, Settings, rate_of
 
@@ -53,7 +53,7 @@ def run(quick: bool) -> Parts:
     paths = [data.SHIPPED] if quick or not paths else paths[:: max(len(paths) // FRAMES, 1)]
     known = shared.pool(paths, 1)
     judged = shared.pool(paths if quick else data.frames("val"), 1 if quick else VALIDATION // 4)
-    initial = regression.init(jax.random.key(0), CONFIGS["tiny"])
+    initial = flnr.init(jax.random.key(0), CONFIGS["tiny"])
     evaluate = jax.jit(shared.objective)
 
     def on_solver(name: str) -> list[dict[str, Any]]:

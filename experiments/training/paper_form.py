@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jflnr.inputs import adaptive_images, frame_inputs
 
 from experiments import data, resume
 from experiments.methods import Method
@@ -19,7 +18,7 @@ from experiments.sweeps import Sweep, everything, method, named
 from experiments.training import shared
 from experiments.tune import quick_psnr
 from jflnr.frame import Array, Frame
-from jflnr.images.inputs import frame_inputs
+from jflnr.images.inputs import frame_inputs, robust_images
 from jflnr.network import examples, features, loss, paper
 from jflnr.network.adam import Adam
 from jflnr.network.checkpoint import load_state, save_state
@@ -119,7 +118,7 @@ def _denoise(frame: Frame, trained: Trained) -> jax.Array:
 @jax.jit
 def guides_of(frame: Frame) -> jax.Array:
     """The guides that ours have, in one array."""
-    return jnp.concatenate(adaptive_images(frame, features.GUIDES)["guides"], axis=-1)
+    return jnp.concatenate(robust_images(frame, features.GUIDES)["guides"], axis=-1)
 
 
 def light_of(trained: Trained, light: jax.Array, guides: jax.Array, weight: Any) -> jax.Array:

@@ -1,4 +1,4 @@
-// Noise that depends on nothing but a counter; its twin in JAX is in jflnr/temporal/bmfr_fit.py.
+// Noise that depends on nothing but a counter; its twin in JAX is in jflnr/bmfr/fit.py.
 // Comes after vectors.h.
 
 // Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".

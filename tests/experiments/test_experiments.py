@@ -61,7 +61,7 @@ def test_interrupted_rows_are_not_redone(tmp_path, monkeypatch):
 
 def test_tikhonov_without_and_with_too_much(frame):
     # No regularisation: both are plain least squares. Too much: nothing is left.
-    plain = jflnr.denoise(frame, parameters=FLR(15.0, 1e-9, 1e-9))
+    plain = jflnr.denoise(frame, FLR(15.0, 1e-9, 1e-9))
     free = np.asarray(tikhonov.denoise(frame, eps=1e-9))
     assert np.median(np.abs(free - np.asarray(plain))) < 3e-2 * np.mean(free)
     assert np.abs(tikhonov.denoise(frame, eps=1e6)).max() < 1e-2

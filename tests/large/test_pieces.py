@@ -3,13 +3,10 @@
 import dataclasses
 import functools
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jflnr
-from jflnr import denoising
 from jflnr.frame import Frame
 from jflnr.large import memory
 from jflnr.large.pieces import pieces
