@@ -10,7 +10,7 @@ demo: $(VENV)/demo
 	@echo "Look at out/demo/room.png (denoised); out/demo/room.exr holds the light itself."
 
 test: $(VENV)/test lint
-	$(RUN) -m pytest -m "not slow" -n auto --dist loadfile
+	$(RUN) -m pytest -m "not slow" -n auto --dist worksteal --durations=10
 
 slow: $(VENV)/test
 	$(RUN) -m pytest -m slow

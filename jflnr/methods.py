@@ -48,7 +48,7 @@ def method_of(method: Any = DEFAULT, **options: Any) -> Any:
         checks.choice("method", method, HOMES)
         home, kind, meant = HOMES[method]
         method = getattr(importlib.import_module(home), kind)(**meant)
-    if isinstance(method, type) or not dataclasses.is_dataclass(method):
+    if not hasattr(method, "for_frame") or isinstance(method, type):
         raise TypeError(f"method must be a name or an object such as FLR(); got {method!r}")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
     for option in options:

@@ -2,7 +2,6 @@
 
 import gc
 import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,13 +18,17 @@ def pytest_configure(config: pytest.Config) -> None:
     # Tests wait for the compiler, not for what it makes; so do the processes that they start.
     flags = os.environ.get("XLA_FLAGS", "")
     os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_optimization_level=0"
-    # Many tests need the same programs, and those of FLNR take a minute to compile. Processes that
-    # tests start find the folder in their environment.
-    if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
-        programs = tempfile.TemporaryDirectory()
-        config.add_cleanup(programs.cleanup)
-        os.environ["JAX_COMPILATION_CACHE_DIR"] = programs.name
+    # Many tests need the same programs, and those of FLNR take a minute to compile: workers and
+    # later runs take them from a folder. Processes that tests start find it in their environment.
+    kept = Path(__file__).parents[1] / "cache" / "programs"
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(kept / "jax"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
+    os.environ.setdefault("POCL_CACHE_DIR", str(kept / "pocl"))
+    Path(os.environ["POCL_CACHE_DIR"]).mkdir(parents=True, exist_ok=True)
     jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    # Programs are kept for one machine, and XLA says at length which features it has.
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -16,7 +16,7 @@ import jflnr
 from experiments import data, results
 from experiments.methods import Method, family, ours, peers
 from jflnr import exr
-from jflnr.cli.common import LABELS
+from jflnr.metrics import LABELS
 from jflnr.report.page import script_data, write_report
 from jflnr.report.scenes import Scene, of_frame
 
