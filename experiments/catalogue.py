@@ -26,6 +26,8 @@ NAMES = (
     "accumulated",
     "sequences",
     "bmfr",
+    "whole",
+    "threads",
 )
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from jflnr.parameters import load_parameters, save_parameters
     from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
     from jflnr.regression.flr import FLR, flr
+    from jflnr.regression.picture import Picture, denoise_picture
 
 __version__ = "0.1.0"
 
@@ -28,8 +29,10 @@ _HOMES = {
     "Auto": "auto.method",
     "Denoiser": "denoising",
     "Frame": "frame",
+    "Picture": "regression.picture",
     "composite": "frame",
     "denoise": "denoising",
+    "denoise_picture": "regression.picture",
     "flnr": "network.flnr",
     "flr": "regression.flr",
     "flr_adaptive": "regression.adaptive",

@@ -1,0 +1,140 @@
+"""Whole pictures of Cycles at 4 samples per pixel: ours beside Open Image Denoise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from experiments import data, plots, results
+from jflnr.exr import read_channels
+from jflnr.frame import Array
+from jflnr.images.guides import draw_near, typical_depth
+from jflnr.metrics import display, exposure, unbiased_mse
+from jflnr.regression.picture import Picture, denoise_picture
+
+NAME = "whole"
+QUESTION = "How near does a whole picture come to Open Image Denoise?"
+MINUTES = 5
+
+# Passes of Blender before 5.0.
+PASSES = {
+    "beauty": ("Combined", "RGB"),
+    "albedo": ("Denoising Albedo", "RGB"),
+    "normal": ("Normal", "XYZ"),
+    "seen_normal": ("Denoising Normal", "XYZ"),
+    "depth": ("Depth", "Z"),
+    "position": ("Position", "XYZ"),
+    "emission": ("Emit", "RGB"),
+    "environment": ("Env", "RGB"),
+    "alpha": ("Combined", "A"),
+}
+FARTHEST = 1e9
+
+
+def folders() -> list[Path]:
+    """Those of the data, and those that `pictures_render` made."""
+    roots = (data.folder().parent / "pictures", Path("cache") / "pictures")
+    return [path.parent for root in roots for path in sorted(root.glob("*/4spp.exr"))]
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """PSNR without the references' noise of every picture, by each method."""
+    rows = []
+    for folder in folders()[: 1 if quick else None]:
+        picture, halves = read(folder / "4spp.exr"), references(folder / "reference.exr")
+        row: dict[str, Any] = {"picture": folder.name}
+        for name, image in images(picture).items():
+            row[name] = psnr(image, *halves)
+        print("  {picture}: {ours:.2f} dB, OIDN {clean:.2f}".format(**row), flush=True)
+        rows.append(row)
+    keys = [key for key in rows[0] if key != "picture"] if rows else []
+    rows.append({"picture": "mean"} | {k: float(np.mean([r[k] for r in rows])) for k in keys})
+    return {"pictures": rows}
+
+
+def read(path: Path) -> Picture:
+    """A picture as Blender writes it, its lengths over the median depth."""
+    channels = read_channels(path)
+    view = next(name for name in channels if name.endswith("Combined.R"))[: -len("Combined.R")]
+    layers: dict[str, Any] = {
+        layer: np.stack([np.float32(channels[f"{view}{name}.{c}"]) for c in components], axis=-1)
+        for layer, (name, components) in PASSES.items()
+    }
+    there = (layers["depth"] > 0) & (layers["depth"] < FARTHEST)
+    unit = np.asarray(typical_depth(layers["depth"], there))
+    middle = np.median(layers["position"][there[..., 0]], axis=0)
+    layers["depth"] = np.asarray(draw_near(np.minimum(layers["depth"], FARTHEST) / unit))
+    layers["position"] = np.where(there, (layers["position"] - middle) / unit, 0)
+    if np.all(layers["alpha"] == 1):
+        del layers["alpha"]
+    else:  # a transparent film does not show it
+        del layers["environment"]
+    return Picture(**layers)
+
+
+def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Two independent halves."""
+    channels = read_channels(path)
+    whole, first = (
+        np.stack([np.float64(channels[f"{name}.{c}"]) for c in "RGB"], axis=-1)
+        for name in ("reference", "reference_a")
+    )
+    return first, 2 * whole - first
+
+
+def images(picture: Picture) -> dict[str, Array]:
+    """Noisy, ours, and OIDN with auxiliaries as they are and prefiltered."""
+    albedo, normal = np.clip(picture.albedo, 0, 1), picture.seen_normal
+    clean = (oidn(albedo=albedo), oidn(normal=normal))
+    denoise = jax.jit(denoise_picture, static_argnames="filtered")
+    return {
+        "noisy": picture.beauty,
+        "ours": np.asarray(denoise(picture, filtered=True).beauty),
+        "raw": oidn(color=picture.beauty, albedo=albedo, normal=normal),
+        "clean": oidn(color=picture.beauty, albedo=clean[0], normal=clean[1], cleanAux=True),
+    }
+
+
+def oidn(*, cleanAux: bool = False, **layers: Any) -> np.ndarray:
+    """OIDN on one layer, or on a colour with auxiliaries; the argument is named as its option."""
+    import pyoidn
+
+    device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
+    device.commit()
+    network = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
+    given = {name: np.ascontiguousarray(layer, np.float32) for name, layer in layers.items()}
+    given["output"] = result = np.zeros_like(next(iter(given.values())))
+    for name, image in given.items():
+        network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+    network.set_bool("hdr", "color" in layers)
+    network.set_bool("cleanAux", cleanAux)
+    network.commit()
+    network.execute()
+    error = device.get_error()
+    network.release()
+    device.release()
+    if error is not None:
+        raise RuntimeError(f"OIDN: {error}")
+    return result
+
+
+def psnr(image: Array, first: np.ndarray, second: np.ndarray) -> float:
+    """Of displayed pictures, in dB."""
+    scale = exposure((first + second) / 2)
+    shown = (display(np.asarray(x, np.float64), scale) for x in (image, first, second))
+    return float(-10 * np.log10(unbiased_mse(*shown)))
+
+
+def draw(result: dict[str, Any], folder: Path) -> None:
+    """A table of PSNR per picture."""
+    columns = {
+        "picture": "picture, 4 spp",
+        "noisy": "noisy",
+        "ours": "ours",
+        "raw": "OIDN",
+        "clean": "OIDN, auxiliaries prefiltered",
+    }
+    plots.write_text(folder / f"{NAME}.md", results.table(result["pictures"], columns))

@@ -1,0 +1,100 @@
+"""What must hold of a whole picture that is denoised."""
+
+import functools
+
+import jax
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr.regression.adaptive import AdaptiveFLR
+from jflnr.regression.picture import Picture, denoise_picture
+
+FEW = AdaptiveFLR(levels=2)
+
+
+@functools.partial(jax.jit, static_argnames="filtered")
+def denoised(picture, filtered=None):
+    return denoise_picture(picture, FEW, filtered=filtered)
+
+
+HEIGHT, WIDTH = 26, 34
+
+
+def layers(rng, **others):
+    """A disc before a wall, four samples per pixel."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH][..., None] + rng.random((2, HEIGHT, WIDTH, 4))
+    disc = (x - 17) ** 2 + (y - 13) ** 2 < 60
+    share = np.mean(disc, axis=-1, keepdims=True)
+    noise = rng.exponential(size=(HEIGHT, WIDTH, 4))
+    albedo = 0.2 + 0.6 * share * [1, 0.5, 0.2]
+    light = np.mean(np.where(disc, 2, 0.5) * noise, axis=-1, keepdims=True)
+    normal = share * [0, 0, 1.0] + (1 - share) * [1.0, 0, 0]
+    made = {"beauty": light * albedo, "albedo": albedo, "normal": normal} | others
+    return Picture(**{name: np.float32(layer) for name, layer in made.items()}), share
+
+
+def test_less_noise_and_about_the_same_light(rng):
+    picture, _ = layers(rng)
+    result = denoised(picture, filtered=True).beauty
+    assert np.std(np.diff(result, axis=1)) < np.std(np.diff(picture.beauty, axis=1)) / 2
+    assert abs(np.mean(result) / np.mean(picture.beauty) - 1) < 0.05
+
+
+def test_scales_with_the_light(rng):
+    picture, share = layers(rng)
+    lamp = np.float32(share * [1, 2, 3])
+    picture = picture._replace(beauty=picture.beauty + lamp, emission=lamp)
+    brighter = picture._replace(beauty=64 * picture.beauty, emission=64 * picture.emission)
+    once, more = denoised(picture, filtered=True), denoised(brighter, filtered=True)
+    np.testing.assert_allclose(more.beauty / 64, once.beauty, rtol=3e-3, atol=1e-4)
+
+
+def test_a_constant_picture_stays():
+    grey = np.full((HEIGHT, WIDTH, 3), 0.5, np.float32)
+    result = denoised(Picture(grey, grey, grey), filtered=True)
+    np.testing.assert_allclose(result.beauty, grey, rtol=1e-3)
+
+
+def test_emission_is_no_light_of_a_surface(rng):
+    """Light that is emitted alone is filtered as a feature and stays where it is."""
+    _, share = layers(rng)
+    lamp = np.float32(share * [9, 8, 7])
+    picture, _ = layers(rng, beauty=lamp, emission=lamp)
+    result = denoised(picture, filtered=True)
+    np.testing.assert_allclose(result.beauty, result.emission, atol=1e-5)
+    assert np.all(result.emission[0] == 0)
+    np.testing.assert_allclose(np.mean(result.emission), np.mean(lamp), rtol=0.05)
+
+
+def test_a_transparent_film_stays_empty_and_alpha_gets_smoother(rng):
+    picture, share = layers(rng)
+    picture = picture._replace(beauty=np.float32(picture.beauty * share), alpha=np.float32(share))
+    result = denoised(picture, filtered=True)
+    assert np.all(result.beauty[:3] == 0)
+    y, x = np.mgrid[:HEIGHT, :WIDTH][..., None] + rng.random((2, HEIGHT, WIDTH, 2000))
+    exact = np.mean((x - 17) ** 2 + (y - 13) ** 2 < 60, axis=-1, keepdims=True)
+    assert np.mean((result.alpha - exact) ** 2) < np.mean((share - exact) ** 2)
+
+
+@pytest.mark.parametrize("missing", [(), ("depth",), ("depth", "position", "seen_normal")])
+def test_light_is_never_negative_and_always_finite(rng, missing):
+    picture, share = layers(rng)
+    others = {"depth": 1 + share, "position": share * [1, 2, 3], "seen_normal": picture.normal}
+    picture = picture._replace(**{n: np.float32(x) for n, x in others.items() if n not in missing})
+    picture.beauty[7, 8] = np.nan
+    picture.beauty[9] = -1
+    result = denoised(picture, filtered=True).beauty
+    assert np.isfinite(result).all()
+    assert np.all(result >= 0)
+
+
+def test_guides_without_noise_are_left_as_they_are(data):
+    frame = jflnr.read_frame(sorted((data / "val").glob("*.exr"))[0])
+    beauty = frame.albedo * frame.indirect
+    picture = Picture(beauty, np.clip(frame.albedo, 0, 1), frame.normal, depth=frame.depth)
+    picture = jax.tree.map(lambda layer: layer[100:164, 100:196], picture)
+    told, given = denoised(picture), denoised(picture, filtered=False)
+    for one, other in zip(jax.tree.leaves(told), jax.tree.leaves(given), strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(told.normal, picture.normal)
