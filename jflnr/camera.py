@@ -29,7 +29,7 @@ class Camera(NamedTuple):
         try:
             to_world = np.array(header["camera_to_world"], np.float64)
             fov_x = float(header["fov_x_degrees"])
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             to_world, fov_x = np.zeros(0), 0.0
         if to_world.shape != (4, 4) or not np.isfinite(to_world).all() or not 0 < fov_x < 180:
             raise ValueError(

@@ -62,7 +62,8 @@ def put(primitive: Callable[..., Any], made: Any, smooth: bool = True, **where: 
 
 def sphere(location: tuple, radius: float, **inputs: Any) -> Any:
     add = bpy.ops.mesh.primitive_uv_sphere_add
-    where: dict[str, Any] = {"location": location, "radius": radius, "segments": 64, "ring_count": 32}
+    where: dict[str, Any] = {"location": location, "radius": radius}
+    where |= {"segments": 64, "ring_count": 32}
     return put(add, material(**inputs), **where)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -190,17 +190,6 @@ def flr_adaptive(
     check_regression(target, guides, None, weight)
     given = regress(method, {"target": target, "guides": guides, "weight": weight})
     return (given["image"], given["error"]) if method.with_error else given["image"]
-
-
-class Pilot(NamedTuple):
-    """The first fit, of the brightness at blocks of 16 pixels (four of the finest).
-
-    coefficients: `(Q + 1, 1, h + 2, w)`, a row of blocks beyond each border. mean: brightness of
-    the frame.
-    """
-
-    coefficients: jax.Array
-    mean: jax.Array
 
 
 def collect_light(method: Any, parts: Parts, known: Known) -> Parts:
