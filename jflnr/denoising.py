@@ -213,7 +213,7 @@ def _whole(method: Any, frame: Frame, names: tuple[str, ...]) -> Parts:
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:
     """What the caller gets, as arrays of the frame's kind."""
-    arrays = list(parts.values())
+    arrays = [parts["image"], *(array for name, array in parts.items() if name != "image")]
     if isinstance(frame.indirect, np.ndarray):
         arrays = [np.asarray(array) for array in arrays]
     else:

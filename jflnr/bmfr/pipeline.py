@@ -19,7 +19,6 @@ from jflnr.bmfr.fit import fit, grid_offset
 from jflnr.bmfr.taa import smooth
 from jflnr.camera import centres, from_centre
 from jflnr.frame import Array, Frame
-from jflnr.regression.arguments import check_options
 from jflnr.regression.division import divide
 from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
 
@@ -51,7 +50,7 @@ class BMFR:
     block: int = field(default=32, metadata={"static": True})
 
     def __post_init__(self) -> None:
-        check_options(self)
+        checks.positive_integer("block", self.block)
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> BMFR:
         return self

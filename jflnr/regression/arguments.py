@@ -23,7 +23,8 @@ def check_options(method: Any) -> None:
             checks.positive_integer(option.name, value)
         elif option.name == "solver":
             checks.choice("solver", value, ("cholesky", "block-inverse"))
-        elif not option.metadata.get("static") and isinstance(value, int | float):
+        # A pytree of the same structure may hold derivatives, in arrays or numbers of numpy.
+        elif not option.metadata.get("static") and type(value) in (bool, int, float):
             if isinstance(value, bool) or not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{option.name} is {value}; it must be a positive number")
 

@@ -24,7 +24,7 @@ def test_descent_counts_its_own_time_and_gives_the_running_mean(monkeypatch):
         known, chosen = data
         return jnp.mean(jnp.sum((params["w"] - known.albedo[chosen]) ** 2, axis=-1))
 
-    known = examples.Example(None, None, None, jnp.stack([target, target, target]), None, None)
+    known = examples.Example(None, None, jnp.stack([target, target, target]), None, None)
     clock = iter(np.arange(0, 1000, 0.5))
     monkeypatch.setattr(shared.time, "process_time", lambda: next(clock))
     solver = Adam(bowl, lambda t: 0.05)

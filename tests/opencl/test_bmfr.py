@@ -74,8 +74,7 @@ def test_driven_as_a_gpu(
 def test_a_plane_is_nan_without_noise_and_not_with_it(context: Context) -> None:
     frame = shot(1, 40, 40)[0]
     for noise, sound in ((0.0, False), (0.01, True)):
-        # As a plain number 0 is refused.
-        method = bmfr.BMFR(noise=np.float32(noise))
+        method = bmfr.BMFR(noise=noise)
         _, image = kernels.step(kernels.start(frame, context), frame, method, context=context)
         assert np.isfinite(image).all() == sound
 
