@@ -27,8 +27,8 @@ def pytest_configure(config: pytest.Config) -> None:
     Path(os.environ["POCL_CACHE_DIR"]).mkdir(parents=True, exist_ok=True)
     jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
-    # Programs are kept for one machine, and XLA says at length which features it has.
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    # Of each program that is kept XLA says at length which features the machine has.
+    os.environ["TF_CPP_MIN_LOG_LEVEL"] = "3"
 
 
 @pytest.fixture(autouse=True, scope="module")
