@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { Q = 5, C = 3, BLOCK = 8, WIDTH = 8, SUPPORT = 72 };
+enum { Q = 5, C = 3, BLOCK = 8, WIDTH = 8, SUPPORT = 48 };
 enum { K = (Q + 1) * (Q + 2) / 2 + (Q + 1) * C }; /* moment planes, kernels_cl/sizes.h */
 static const float SIGMA = 15.0f, EPS = 1.3e-5f, EPS_PRIME = 6.5e-3f;
 
