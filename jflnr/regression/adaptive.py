@@ -19,7 +19,7 @@ import jax.numpy as jnp
 from jflnr.frame import Frame
 from jflnr.images.inputs import robust_images, same_size
 from jflnr.regression import energy
-from jflnr.regression.apply import apply, apply_rows, with_borders
+from jflnr.regression.apply import apply
 from jflnr.regression.arguments import check_options, check_regression
 from jflnr.regression.floor import with_own_light
 from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
@@ -225,8 +225,7 @@ def fit_pilot(method: Any, parts: Parts, known: Known) -> Parts:
 def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
     """Pass 2: moments of the weighted pixels on the finest blocks, and one plane of their noise."""
     target, guides, shift = parts["target"], parts["guides"], known["shift"]
-    pilot = with_borders(parts["pilot"])
-    expected = apply_rows(pilot, guides, shift, 4 * method.finest)[..., 0]
+    expected = apply(parts["pilot"], guides, shift, 4 * method.finest)[..., 0]
     light = light_of(target, known["unit"])
     weights, squares = _weights(light, guides, expected, known["mean"], parts["weight"], method)
     weighted = target, guides, shift, weights, squares, method.finest, known["unit"]

@@ -34,28 +34,8 @@ def apply(
     than this times the light of its block.
     Returns `(H, W, C)`.
     """
-    return apply_rows(with_borders(coefficients), guides, shift, block, floor)
-
-
-def with_borders(coefficients: jax.Array) -> jax.Array:
-    """The first and the last row of blocks repeated: `(..., h, w)` to `(..., h + 2, w)`.
-
-    So the interpolation is clamped at a frame's borders.
-    """
-    return jnp.pad(coefficients, ((0, 0), (0, 0), (1, 1), (0, 0)), mode="edge")
-
-
-def apply_rows(
-    coefficients: jax.Array,
-    guides: Guides,
-    shift: jax.Array,
-    block: int,
-    floor: jax.Array | float | None = None,
-) -> jax.Array:
-    """`apply` on some whole rows of blocks of a frame.
-
-    coefficients: as there, but `h + 2` rows, with those of blocks above and below.
-    """
+    # The first and the last row of blocks repeated, so the interpolation is clamped at the borders.
+    coefficients = jnp.pad(coefficients, ((0, 0), (0, 0), (1, 1), (0, 0)), mode="edge")
     height, width = jax.tree.leaves(guides)[0].shape[:2]
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
@@ -73,7 +53,7 @@ def apply_strip(
     block: int,
     floor: jax.Array | float | None = None,
 ) -> jax.Array:
-    """`apply_rows` on few rows of blocks, all at once.
+    """`apply` on few rows of blocks, all at once, with one more of them above and below.
 
     Horizontally a row is cut into cells from one block centre to the next, where the model is
     `start + t difference`; the guides are multiplied in before t is, which halves the work.
