@@ -46,9 +46,8 @@ def _rendered(path: Path, counts: tuple[int, ...], realisations: int) -> dict[st
         from jflnr.files import replacing
 
         facts = jflnr.read_header(path)
-        settings = frame.Settings(
-            facts["width"], facts["height"], SEED, counts, realisations, facts["bounces"]
-        )
+        spp = (*counts, *(1,) * (realisations - 1))
+        settings = frame.Settings(facts["width"], facts["height"], SEED, spp, facts["bounces"])
         camera = Camera(np.array(facts["camera_to_world"]), facts["fov_x_degrees"])
         tracer = Tracer.of(load(facts["scene"]).scene, camera, settings.width, settings.height)
         rendered = frame.noisy(tracer, settings)

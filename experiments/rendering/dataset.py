@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from experiments.rendering import frame, sequence
 from experiments.rendering.manifest import Manifest
 from experiments.rendering.reference import Goal
@@ -19,18 +21,13 @@ from experiments.rendering.source import RANDOM, load
 from experiments.rendering.splits import TEST, TRAIN_ROOMS, VAL, check_split
 from jflnr import read_header
 
-NOISY = {
-    "train": (1, 2, 4, 8, 16),
-    "val": (1, 2, 4, 8, 16, 32, 64),
-    "test": (1, 2, 4, 8, 16, 32, 64),
-}
-REALISATIONS = 4
-ERROR = {"train": 0.06, "val": 0.02, "test": 0.02}
-SECONDS_PER_PIXEL = 75 / (320 * 184)  # of a processor at most, for a reference
+# Training frames are many rather than good: their references are what denoising them leaves.
+TRAINING, SAMPLES = (1, 1, 1, 1, 4, 4, 16, 16), 96
+NARROW = 0.6  # of every second training view's field of view: as a part of a larger frame
+NOISY = (1, 2, 4, 8, 16, 32, 64, 1, 1, 1)
+ERROR = 0.02
 TWENTY_MINUTES = 2400.0  # of two cores
-STRONG = 4  # rounds with strong colours; then come calm ones
-# Views of which `shared/data` has noisier references.
-STORED = {"bathroom": (0, 4), "staircase": (0, 1), "living-room-2": (0, 3), "living-room": (0, 1)}
+FIRST = 500  # seed of the first training scenes
 # One sequence of every scene of val and test, and what moves in it.
 MOTIONS = {
     "veach-lamp": "object",
@@ -69,25 +66,17 @@ class Job:
 
 
 def training_jobs() -> Iterator[Job]:
-    """The views of `shared/data`, then rounds of new ones without end."""
-    for scene, views in STORED.items():
-        for view in views:
-            yield Job(scene, view, 640, 360)
-    for number in itertools.count():
-        yield from _round(number)
+    """Two views of a scene of every family, of a second sunlit one and of a room, without end.
 
-
-def _round(number: int) -> Iterator[Job]:
-    """A view of one scene of every family, of a second sunlit one and of one training room.
-
-    Most real rooms are sunlit, and little light is found in them. Most frames are 320 x 184;
-    those of every sixth round are 640 x 360, of every twelfth a quarter 1280 x 720.
+    Every second round has calm colours. Most real rooms are sunlit, and little light is found in
+    them.
     """
-    room = TRAIN_ROOMS[number % len(TRAIN_ROOMS)]
-    seed = number + (1 if number < STRONG else CALM)
-    for index, name in enumerate([*(f"{f}-{seed}" for f in FAMILIES), f"sunlit-{seed + 999}"]):
-        yield Job(name, RANDOM, *_size(number, index))
-    yield Job(room, RANDOM + number // len(TRAIN_ROOMS), *_size(number, len(FAMILIES) + 1))
+    for number in itertools.count():
+        seed = FIRST + number + CALM * (number % 2)
+        room = TRAIN_ROOMS[number % len(TRAIN_ROOMS)]
+        for scene in [*(f"{f}-{seed}" for f in FAMILIES), f"sunlit-{seed + 999}"]:
+            yield from (Job(scene, RANDOM + i, 320, 184) for i in range(2))
+        yield from (Job(room, RANDOM + 50 + 2 * number + i, 320, 184) for i in range(2))
 
 
 def evaluation_jobs(split: str) -> Iterator[Job]:
@@ -99,28 +88,17 @@ def evaluation_jobs(split: str) -> Iterator[Job]:
         yield Job(scene, 0, 640, 360, split, MOTIONS[scene], number)
 
 
-def _size(number: int, index: int) -> tuple[int, int]:
-    if number % 12 == 11 and index % 4 == number // 12 % 4:
-        return 1280, 720
-    return (640, 360) if number % 6 == 5 else (320, 184)
-
-
 def settings_of(job: Job) -> frame.Settings:
-    """Four 1-spp realisations and more, of a sequence one; the reference's goal."""
+    """The noisy layers of a job, and the goal of its reference."""
     if job.motion:
         seed = stream_seed(job.scene, job.view, job.motion)
         return frame.Settings(job.width, job.height, seed, goal=SEQUENCE_GOAL)
-    many = job.split == "train" and job.view >= RANDOM
-    seconds = SECONDS_PER_PIXEL * job.width * job.height if many else TWENTY_MINUTES
-    return frame.Settings(
-        job.width,
-        job.height,
-        stream_seed(job.scene, job.view, job.width),
-        noisy=NOISY[job.split],
-        realisations=REALISATIONS,
-        direct_spp=64 if job.split == "train" else 256,
-        goal=Goal(ERROR[job.split], seconds=seconds),
-    )
+    seed = stream_seed(job.scene, job.view, job.width)
+    if job.split == "train":
+        goal = Goal(0.0, SAMPLES, SAMPLES)
+        return frame.Settings(job.width, job.height, seed, TRAINING, direct_spp=1, goal=goal)
+    goal = Goal(ERROR, seconds=TWENTY_MINUTES)
+    return frame.Settings(job.width, job.height, seed, NOISY, direct_spp=256, goal=goal)
 
 
 def fill(
@@ -160,6 +138,11 @@ def fill(
     return there
 
 
+def narrowed(fov_x: float) -> float:
+    """The angle that `NARROW` of a picture's width covers, in degrees."""
+    return float(np.degrees(2 * np.arctan(NARROW * np.tan(np.radians(fov_x) / 2))))
+
+
 _load = functools.lru_cache(maxsize=1)(load)
 
 
@@ -174,6 +157,8 @@ def render_job(folder: Path, job: Job) -> dict[str, Any] | str:
     if found is None:
         return "no valid view was found"
     camera, near = found
+    if job.split == "train" and job.view % 2:
+        camera = camera._replace(fov_x=narrowed(camera.fov_x))
     state = folder / "state" / (job.name.replace("/", "_") + ".npz")
     settings = settings_of(job)
     if job.motion:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import mitsuba as mi
@@ -27,13 +28,12 @@ Layers = dict[str, NDArray[np.floating[Any]]]
 
 @dataclass(frozen=True)
 class Settings:
-    """What a frame holds. `noisy` are the sample counts, `realisations` those of 1 spp."""
+    """What a frame holds. `noisy` are the sample counts, repeated for more realisations."""
 
     width: int = 640
     height: int = 360
     seed: int = 0
     noisy: tuple[int, ...] = (1,)
-    realisations: int = 1
     bounces: int = 1
     mis: bool = True
     direct_spp: int = 128
@@ -43,9 +43,11 @@ class Settings:
 
 def noisy_names(settings: Settings) -> dict[str, int]:
     """Names of the noisy layers and their sample counts: indirect_1, indirect_1_b, indirect_2..."""
-    names = {f"indirect_{n}": n for n in settings.noisy}
-    letters = "abcdefghijklmnopqrstuvwxyz"[1 : settings.realisations]
-    return names | {f"indirect_1_{letter}": 1 for letter in letters}
+    names: dict[str, int] = {}
+    for index, spp in enumerate(settings.noisy):
+        before = settings.noisy[:index].count(spp)
+        names[f"indirect_{spp}" + (f"_{ascii_lowercase[before]}" if before else "")] = spp
+    return names
 
 
 def render(

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 REPLICATES = 4
 SAVE_EVERY = 60.0  # seconds
+FEW = 256  # samples a pixel
 STOP_LEARNING = 2048  # samples a pixel
 
 
@@ -94,7 +95,7 @@ class Accumulator:
         """Sample until the goal is met; saves its state on the way, and when it is interrupted."""
         saved = time.monotonic()
         if not self.enough(goal):
-            self.prepare()
+            self.prepare(few=goal.most_spp < FEW)
         try:
             while not self.enough(goal):
                 self._step(goal)
@@ -107,16 +108,21 @@ class Accumulator:
             self.save()
             raise
 
-    def prepare(self) -> None:
-        """Teach the guide, then keep or drop multiple importance sampling, whichever is better."""
+    def prepare(self, few: bool = False) -> None:
+        """Teach the guide, then keep or drop multiple importance sampling, whichever is better.
+
+        For a few samples only, a trial would cost more than it saves: it pays under a sky.
+        """
         self.guide, self.mis = self.tracer.guide(), self.settings.mis
         if self.guide is None:  # scalar variant: a pilot would cost more than it saves
             return
-        for i, spp in enumerate((16, 32)):
+        for i, spp in enumerate((16,) if few else (16, 32)):
             seed = stream_seed(self.seed, "pilot", i)
             self._indirect(spp, seed, 0)
             self.guide.learn()
-        if self.settings.mis:
+        if few:
+            self.mis = self.mis and self.tracer.lights.environment
+        elif self.settings.mis:
             self.mis = self._cost(True) < self._cost(False)
 
     def _cost(self, mis: bool) -> float:

@@ -58,13 +58,12 @@ def settings_of(
 ) -> frame.Settings:
     """Those of a frame; of its reference as many samples, or such an `error`."""
     spp = facts["reference_spp"]
-    noisy = [name.removeprefix("indirect_") for name in layers if name.startswith("indirect_")]
+    noisy = [name.split("_")[1] for name in sorted(layers) if name.startswith("indirect_")]
     return frame.Settings(
         facts["width"],
         facts["height"],
         facts["seed"],
-        tuple(sorted(int(n) for n in noisy if n.isdigit())),
-        1 + sum(not n.isdigit() for n in noisy),
+        tuple(sorted(int(n) for n in noisy)),
         facts["bounces"],
         "MIS" in facts["sampling"],
         facts["direct_spp"],

@@ -25,4 +25,4 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         threads = arguments.threads
         workers.fill(arguments.cluster, arguments.folder, jobs, frames, threads, say)
-    print(Manifest(arguments.folder).summary(split, ERROR[split]))
+    print(Manifest(arguments.folder).summary(split, ERROR))
