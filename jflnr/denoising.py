@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jax
 import numpy as np
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
+from jflnr.lazy import jax
 from jflnr.methods import BACKENDS, DEFAULT, method_of
 from jflnr.stages import Parts, regress
 
@@ -27,10 +29,12 @@ def _own_settings(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function in float32, with the promotions it was written for, whatever JAX is told."""
 
     @functools.wraps(function)
-    def wrapped(*given: Any, **named: Any) -> Any:
+    def wrapped(self: Denoiser, *given: Any, **named: Any) -> Any:
+        if "jax" not in sys.modules and self.backend == "opencl":
+            return function(self, *given, **named)
         rank, kind = jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard")
         with jax.enable_x64(False), rank, kind:
-            return function(*given, **named)
+            return function(self, *given, **named)
 
     return wrapped
 
@@ -43,7 +47,8 @@ def _native(frame: Frame) -> Frame:
             return layer
         return layer.astype(np.float16 if layer.dtype.itemsize == 2 else np.float32, copy=False)
 
-    return jax.tree.map(native, frame)
+    layers = {name: native(layer) for name, layer in vars(frame).items() if layer is not None}
+    return dataclasses.replace(frame, **layers)
 
 
 def denoise(
@@ -128,7 +133,7 @@ class Denoiser:
         if self.tile is not None:
             return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":
-            return _given(_whole(method, inputs, names), frame, out)
+            return _given(_whole()(method, inputs, names), frame, out)
         light = self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
         return light if out is not None else _given({"image": light}, frame, None)
 
@@ -206,9 +211,12 @@ class Denoiser:
         return functools.partial(home.start, **options), step
 
 
-@functools.partial(jax.jit, static_argnames="names")
-def _whole(method: Any, frame: Frame, names: tuple[str, ...]) -> Parts:
-    return regress(method, method.images(frame, names))
+@functools.cache
+def _whole() -> Callable[..., Parts]:
+    def run(method: Any, frame: Frame, names: tuple[str, ...]) -> Parts:
+        return regress(method, method.images(frame, names))
+
+    return jax.jit(run, static_argnames="names")
 
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:

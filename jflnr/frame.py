@@ -3,23 +3,25 @@
 Layers and their meaning are DESIGN.md's ("The frame").
 """
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-import jax
 import numpy as np
 
 from jflnr import checks, exr, layouts
 from jflnr.files import json_object
+from jflnr.lazy import jax, pytree
 
-Array: TypeAlias = np.ndarray | jax.Array
+Array: TypeAlias = "np.ndarray | jax.Array"
 
 HALF_MAX = float(np.finfo(np.float16).max)
 
 
-@jax.tree_util.register_dataclass
+@pytree
 @dataclass(frozen=True)
 class Frame:
     """The layers of one frame, each (H, W, C) float32 or None; a pytree.
@@ -88,9 +90,9 @@ def composite(frame: Frame, indirect: Array) -> Array:
     checks.image("indirect", indirect, 3)
     checks.same_size(albedo=frame.albedo, indirect=indirect)
     light = indirect if frame.direct is None else frame.direct + indirect
-    jnp = np if isinstance(frame.albedo, np.ndarray) else jax.numpy
-    known = jnp.isfinite(frame.albedo).all(axis=-1, keepdims=True) & (frame.albedo != 0)
-    picture = jnp.where(known, frame.albedo * light, 0)
+    xp: Any = frame.albedo.__array_namespace__()
+    known = xp.isfinite(frame.albedo).all(axis=-1, keepdims=True) & (frame.albedo != 0)
+    picture = xp.where(known, frame.albedo * light, 0)
     return picture if frame.emission is None else picture + frame.emission
 
 

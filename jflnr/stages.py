@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import jax.numpy as jnp
+from jflnr.lazy import jnp
 
 # Arrays by name. Pixels lie in `(H, W, C)`, what is on blocks in `(..., h, w)`.
 Parts: TypeAlias = dict[str, Any]

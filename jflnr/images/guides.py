@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
-
 from jflnr.frame import Array, Frame
 
 DEFAULT = ("normal", "depth", "ao")
@@ -40,8 +37,8 @@ class Scene(NamedTuple):
     depth: median depth of the surfaces. middle: a point among them; zeros without positions.
     """
 
-    depth: jax.Array
-    middle: jax.Array
+    depth: Array
+    middle: Array
 
 
 def scene_of(frame: Frame) -> Scene:
@@ -49,8 +46,9 @@ def scene_of(frame: Frame) -> Scene:
     height, width = frame.depth.shape[:2]
     step = depth_step(height, width)
     mask = None if frame.mask is None else frame.mask[::step, ::step]
-    middle = jnp.zeros(3) if frame.position is None else frame.position[height // 2, width // 2]
-    return Scene(typical_depth(frame.depth[::step, ::step], mask), jnp.nan_to_num(middle))
+    depth, xp = frame.depth[::step, ::step], frame.depth.__array_namespace__()
+    middle = xp.zeros(3) if frame.position is None else frame.position[height // 2, width // 2]
+    return Scene(typical_depth(depth, mask), xp.nan_to_num(middle))
 
 
 def depth_step(height: int, width: int) -> int:
@@ -58,15 +56,19 @@ def depth_step(height: int, width: int) -> int:
     return max(round((height * width / 16384) ** 0.5), 1)
 
 
-def typical_depth(depth: Array, mask: Array | None) -> jax.Array:
+def typical_depth(depth: Array, mask: Array | None) -> Array:
     """Median depth of the surfaces; 1 if there are none.
 
     depth: `(H, W, 1)` in scene units. mask: `(H, W, 1)` or None. Returns a scalar.
     """
-    sample = jnp.asarray(depth, jnp.float32)
-    surface = sample > 0 if mask is None else jnp.asarray(mask) > 0
-    median = jnp.nanmedian(jnp.where(surface & jnp.isfinite(sample), sample, jnp.nan))
-    return jnp.where(median > 0, median, 1)
+    xp = depth.__array_namespace__()
+    sample = xp.asarray(depth, dtype=xp.float32)
+    surface = (sample if mask is None else mask) > 0
+    # What does not count lies beyond all that does.
+    ordered = xp.sort(xp.where(surface & xp.isfinite(sample), sample, xp.inf), axis=None)
+    count = xp.sum(xp.isfinite(ordered))
+    middle = (ordered[xp.maximum(count - 1, 0) // 2] + ordered[count // 2]) / 2
+    return xp.where((count > 0) & (middle > 0), middle, xp.float32(1))
 
 
 def layers(frame: Frame, names: Sequence[str], scene: Scene | None = None) -> tuple[Any, ...]:
@@ -84,33 +86,33 @@ def layers(frame: Frame, names: Sequence[str], scene: Scene | None = None) -> tu
     if "position" in chosen:
         # Regularisation grows with a guide's distance from zero, and the origin means nothing.
         chosen["position"] = (chosen["position"] - scene.middle) * scale
-    none = jnp.zeros((*frame.depth.shape[:2], 0), jnp.float32)
+    none = frame.depth[..., :0]
     return tuple(chosen[name] for name in names) or (none,)
 
 
-@jax.jit
-def draw_near(depth: Array) -> jax.Array:
+def draw_near(depth: Array) -> Array:
     """Depth over its median, bent beyond `FAR` so that none exceeds `FAR + 1`.
 
     Where a room is seen into the open through a slit, the models of the blocks around, which know
     nothing so far away, would be extrapolated and leave bright streaks.
     """
-    beyond = jnp.maximum(depth - FAR, 0)
-    return jnp.minimum(depth, FAR) + beyond / (1 + beyond)
+    xp = depth.__array_namespace__()
+    beyond = xp.maximum(depth - FAR, 0)
+    return xp.minimum(depth, FAR) + beyond / (1 + beyond)
 
 
-def shrink(image: Array, factor: int, mask: Array | None = None) -> jax.Array:
+def shrink(image: Array, factor: int, mask: Array | None = None) -> Any:
     """Mean over `factor` x `factor` pixels, of those in the mask only.
 
     image: `(H, W, C)`. mask: `(H, W, 1)` or None. Returns `(ceil(H/f), ceil(W/f), C)`.
     """
-    image = jnp.asarray(image)
-    weight = jnp.ones((*image.shape[:2], 1), image.dtype) if mask is None else jnp.asarray(mask)
+    xp = image.__array_namespace__()
+    weight = xp.ones((*image.shape[:2], 1), image.dtype) if mask is None else mask
     margins = [(0, -size % factor) for size in image.shape[:2]] + [(0, 0)]
 
-    def totals(x: jax.Array) -> jax.Array:
-        x = jnp.pad(x, margins)
+    def totals(x: Array) -> Array:
+        x = xp.pad(x, margins)
         h, w, c = x.shape[0] // factor, x.shape[1] // factor, x.shape[2]
         return x.reshape(h, factor, w, factor, c).sum((1, 3))
 
-    return totals(image * weight) / jnp.maximum(totals(weight), 1e-6)
+    return totals(image * weight) / xp.maximum(totals(weight), 1e-6)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
+from jflnr.lazy import jax, jnp
 
 # How far neighbours may differ, one standard deviation: normals, and depth as a share of itself.
 NORMAL, DEPTH = 0.25, 0.02

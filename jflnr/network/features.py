@@ -6,10 +6,9 @@ with the scale of the light, and depth comes divided by its median.
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
+from jflnr.lazy import jax, jnp
 from jflnr.network import unet
 from jflnr.regression.level import Grid, brightness, mean_guides, predict
 from jflnr.regression.moments import index_xx, index_xy

@@ -15,13 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-import jax
-import jax.numpy as jnp
-
 from jflnr.frame import Array, Frame
 from jflnr.images.guides import Scene
 from jflnr.images.inputs import robust_images
 from jflnr.images.noisy_guides import smooth_guide
+from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
 from jflnr.regression import adaptive, energy, widths
 from jflnr.regression.adaptive import AdaptiveFLR
@@ -40,7 +38,7 @@ PLANES, ENDS = ALIKE + 2 + features.CHANNELS, (ALIKE, ALIKE + 1, ALIKE + 2)
 LARGEST_GAIN, LARGEST_WEIGHT, LARGEST_WIDTH = 2.0, 2.0, 0.7
 
 
-@jax.tree_util.register_dataclass
+@pytree
 @dataclass(frozen=True)
 class FLNR(AdaptiveFLR):
     """Adaptive FLR, steered by a network (docs/flnr.md).

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
-import jax
-import jax.numpy as jnp
-from jax import lax
+from jflnr.lazy import jax, jnp, lax
 
-Params: TypeAlias = dict[str, jax.Array]
+Params: TypeAlias = "dict[str, jax.Array]"
 
 
 def init(key: jax.Array, inputs: int, widths: Sequence[int], heads: Sequence[int]) -> Params:

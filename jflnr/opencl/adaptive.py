@@ -7,11 +7,17 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from jflnr.opencl.apply import Restored, apply
-from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
+from jflnr.opencl.arguments import (
+    check_counts,
+    numbers_of,
+    to_image,
+    to_layers,
+    to_output,
+    to_weight,
+)
 from jflnr.opencl.context import Context, default_context, is_device_array
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
@@ -110,7 +116,7 @@ def _denoise(
     shift = centre(context, guides)
     moments = collect(context, target, guides, shift, 2 * block, weight, light=True)
     mean = frame_mean(context, moments, w, count)
-    run = Run(context, count, channels, jax.tree.map(float, method), shift, mean)
+    run = Run(context, count, channels, numbers_of(method), shift, mean)
     pilot = fit_pilot(run, moments, w, block)
     grid = collect_weighted(run, target, guides, pilot, weight, block)
     _, merged = fit_levels(run, grid, block, method.levels)

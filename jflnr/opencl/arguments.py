@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
-import jax
 import numpy as np
 
 from jflnr.opencl.context import Context, is_device_array
 from jflnr.opencl.moments import PARTS
+from jflnr.regression.arguments import layers_of
 
 MOST = {"guides": 16, "target": 9}
 
@@ -22,6 +23,19 @@ def check_counts(guides: int, channels: int) -> None:
             )
 
 
+def numbers_of(method: Any) -> Any:
+    """The method with its numbers as those of Python; fields without one stay."""
+    fields = ((field, getattr(method, field.name)) for field in dataclasses.fields(method))
+    return dataclasses.replace(
+        method,
+        **{
+            field.name: float(value)
+            for field, value in fields
+            if value is not None and not field.metadata.get("static")
+        },
+    )
+
+
 def to_image(values: Any) -> Any:
     """As the kernels can read it: float16 or float32, in C order, a device array as it is."""
     if is_device_array(values):
@@ -33,7 +47,7 @@ def to_image(values: Any) -> Any:
 
 def to_layers(context: Context, guides: Any) -> tuple[Any, ...]:
     """The guides as at most `PARTS` device arrays of one type, none of them without channels."""
-    layers = [to_image(layer) for layer in jax.tree.leaves(guides) if layer.shape[2]]
+    layers = [to_image(layer) for layer in layers_of(guides) if layer.shape[2]]
     if len({layer.dtype for layer in layers}) > 1:
         layers = [layer.astype(np.float32) for layer in layers]
     if len(layers) > PARTS:

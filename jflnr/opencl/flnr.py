@@ -6,7 +6,6 @@ import dataclasses
 import functools
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from jflnr.network import features, unet
@@ -15,7 +14,7 @@ from jflnr.network.flnr import DEFAULT, FLNR
 from jflnr.opencl import network_features, network_unet
 from jflnr.opencl.adaptive import fit_levels, fit_pilot, in_unit
 from jflnr.opencl.apply import Restored, apply
-from jflnr.opencl.arguments import to_layers, to_output, to_weight
+from jflnr.opencl.arguments import numbers_of, to_layers, to_output, to_weight
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
@@ -98,7 +97,7 @@ def prepare(
     w, shift = -(-target.shape[1] // (2 * BLOCK)), centre(context, guides)
     moments = collect(context, target, guides, shift, 2 * BLOCK, weight, light=True)
     mean = frame_mean(context, moments, w, GUIDES)
-    numbers = jax.tree.map(float, dataclasses.replace(method, params=None))
+    numbers = numbers_of(dataclasses.replace(method, params=None))
     run = Run(context, GUIDES, features.CHANNELS, numbers, shift, mean)
     pilot = fit_pilot(run, moments, w, BLOCK)
     grid = collect_weighted(run, target, guides, pilot, weight, BLOCK)

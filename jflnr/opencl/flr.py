@@ -5,15 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-import jax
-
 from jflnr.opencl.apply import apply
 from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
 from jflnr.opencl.blur import blur
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.solve import solve
-from jflnr.regression.arguments import channel_count, check_regression
+from jflnr.regression.arguments import channel_count, check_regression, layers_of
 from jflnr.regression.flr import DEFAULT, FLR
 
 
@@ -64,5 +62,5 @@ def flr(
 
 
 def _shape(target: Any, guides_map: Any | None) -> tuple[int, int, int]:
-    layers = [] if guides_map is None else jax.tree.leaves(guides_map)
+    layers = [] if guides_map is None else layers_of(guides_map)
     return (*(layers[0] if layers else target).shape[:2], target.shape[2])

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
+import numpy as np
 
 from jflnr.opencl.context import Context
 from jflnr.regression.adaptive import AdaptiveFLR
@@ -78,5 +78,5 @@ class Run(NamedTuple):
 @functools.cache
 def brightness_defines(channels: int) -> dict[str, Any]:
     """The defines of kernels_cl/sizes.h for the brightness of an image of C channels."""
-    weights = brightness(channels, jnp.float32).tolist()
+    weights = brightness(channels, np.float32).tolist()
     return {f"BRIGHTNESS_{i}": f"{weights[i % channels]:.8f}f" for i in range(3)}

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
-from jflnr.network.flnr import FLNR
-from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
-from jflnr.opencl.flnr import flnr
-from jflnr.opencl.flr import flr
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.flr import FLR
 from jflnr.stages import Parts
 
-REGRESSIONS: dict[type, Any] = {FLR: flr, AdaptiveFLR: flr_adaptive, FLNR: flnr}
+# By the method's type: module, function.
+REGRESSIONS = {
+    "FLR": ("flr", "flr"),
+    "AdaptiveFLR": ("adaptive", "flr_adaptive"),
+    "FLNR": ("flnr", "flnr"),
+}
 
 
 def regress(method: Any, images: Parts, context: Context, **options: Any) -> Any:
@@ -23,4 +23,6 @@ def regress(method: Any, images: Parts, context: Context, **options: Any) -> Any
     """
     given = {name: image for name, image in images.items() if image is not None}
     target, guides = given.pop("target"), given.pop("guides")
-    return REGRESSIONS[type(method)](target, guides, method, context=context, **given, **options)
+    module, function = REGRESSIONS[type(method).__name__]
+    run = getattr(importlib.import_module(f"jflnr.opencl.{module}"), function)
+    return run(target, guides, method, context=context, **given, **options)

@@ -13,11 +13,9 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-import jax
-import jax.numpy as jnp
-
 from jflnr.frame import Frame
 from jflnr.images.inputs import robust_images, same_size
+from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression import energy
 from jflnr.regression.apply import apply
 from jflnr.regression.arguments import check_options, check_regression
@@ -40,7 +38,7 @@ from jflnr.regression.window import REACH
 from jflnr.stages import Known, Parts, Stage, regress
 
 
-@jax.tree_util.register_dataclass
+@pytree
 @dataclass(frozen=True)
 class AdaptiveFLR:
     """The method of docs/adaptive.md, and its fitted constants.

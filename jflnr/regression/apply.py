@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.floor import lift
 from jflnr.regression.moments import Guides, from_shift, planes
 from jflnr.regression.strips import cut, fill, step_of

@@ -6,8 +6,7 @@ import dataclasses
 import math
 from typing import Any
 
-import jax
-import jax.numpy as jnp
+import numpy as np
 
 from jflnr import checks
 
@@ -39,9 +38,9 @@ def check_regression(
     checks.image("target", target)
     if target.shape[2] == 0:
         raise ValueError(f"target needs at least one channel; its shape is {target.shape}")
-    if not jax.tree.leaves(guides):
+    if not layers_of(guides):
         raise ValueError("guides must be an array (H, W, Q) or several; Q may be 0 for none")
-    for layer in jax.tree.leaves(guides):
+    for layer in layers_of(guides):
         checks.image("guides", layer)
         checks.same_size(target=target, guides=layer)
     if weight is not None and getattr(weight, "shape", None) != target.shape[:2]:
@@ -51,19 +50,19 @@ def check_regression(
         )
     named = {"target": target, "guides": guides, "guides_map": guides_map}
     for name, images in named.items():
-        for image in jax.tree.leaves(images):
-            if not jnp.issubdtype(image.dtype, jnp.floating):
+        for image in layers_of(images):
+            if not (np.issubdtype(image.dtype, np.floating) or "float" in str(image.dtype)):
                 raise TypeError(f"{name} must hold floating-point numbers; it holds {image.dtype}")
     return 1 if guides_map is None else _finer_by(target, guides, guides_map)
 
 
 def _finer_by(target: Any, guides: Any, guides_map: Any) -> int:
     coarse = target.shape[:2]
-    fine = {layer.shape[:2] for layer in jax.tree.leaves(guides_map)} or {coarse}
+    fine = {layer.shape[:2] for layer in layers_of(guides_map)} or {coarse}
     if channel_count(guides_map) != channel_count(guides) or len(fine) > 1:
         raise ValueError(
             f"guides_map must have the {channel_count(guides)} channels of guides and one size; "
-            f"got {[layer.shape for layer in jax.tree.leaves(guides_map)]}"
+            f"got {[layer.shape for layer in layers_of(guides_map)]}"
         )
     height, width = fine.pop()
     factor = checks.times_finer((height, width), coarse)
@@ -75,6 +74,13 @@ def _finer_by(target: Any, guides: Any, guides_map: Any) -> int:
     return factor
 
 
+def layers_of(images: Any) -> list[Any]:
+    """One image `(H, W, Q)`, or several in tuples, as a list."""
+    if isinstance(images, tuple | list):
+        return [layer for some in images for layer in layers_of(some)]
+    return [] if images is None else [images]
+
+
 def channel_count(images: Any) -> int:
     """The number of channels of an image `(H, W, Q)`, or of several together."""
-    return sum(layer.shape[-1] for layer in jax.tree.leaves(images))
+    return sum(layer.shape[-1] for layer in layers_of(images))

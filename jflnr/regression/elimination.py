@@ -9,10 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-import jax
-import jax.numpy as jnp
-from jax import lax
-
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.division import divide
 
 Solver = Literal["cholesky", "block-inverse"]

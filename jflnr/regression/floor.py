@@ -6,9 +6,7 @@ lie far from their mean: in gaps and corners that the window hardly knows.
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
-
+from jflnr.lazy import jax, jnp
 from jflnr.regression.level import brightness
 
 

@@ -7,11 +7,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-import jax
-import jax.numpy as jnp
-
 from jflnr.frame import Frame
 from jflnr.images.inputs import factor_of, plain_images
+from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression.apply import apply
 from jflnr.regression.arguments import check_options, check_regression
 from jflnr.regression.blur import blur
@@ -25,7 +23,7 @@ from jflnr.stages import Known, Parts, Stage, regress
 TRACED, STEP = 72, 24
 
 
-@jax.tree_util.register_dataclass
+@pytree
 @dataclass(frozen=True)
 class FLR:
     """The method of section 3.2. The numbers were fitted on training frames at 1 spp
@@ -148,6 +146,8 @@ def support_of(sigma: jax.Array | float, longest: int) -> int:
 
     A width that is traced, or differs from frame to frame, has no number yet.
     """
-    if isinstance(sigma, jax.core.Tracer) or jnp.ndim(sigma):
+    if not isinstance(sigma, int | float) and (
+        isinstance(sigma, jax.core.Tracer) or jnp.ndim(sigma)
+    ):
         return TRACED
     return STEP * max(math.ceil(min(3 * float(sigma), longest) / STEP), 1)

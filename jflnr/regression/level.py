@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
+from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.moments import index_xx, index_xy
 from jflnr.regression.pyramid import halve
@@ -50,7 +49,7 @@ class Fit(NamedTuple):
     window: Window
 
 
-def brightness(channels: int, dtype: jnp.dtype) -> jax.Array:
+def brightness(channels: int, dtype: Any) -> Any:
     """Weights `(C,)` of the channels in the brightness by which all of them are treated.
 
     Luminance of linear sRGB for colours, or for several light groups of three channels, whose sum
@@ -58,7 +57,7 @@ def brightness(channels: int, dtype: jnp.dtype) -> jax.Array:
     """
     luminance = (0.2126, 0.7152, 0.0722)
     weights = luminance * (channels // 3) if channels % 3 == 0 else (1,) * channels
-    return jnp.asarray(weights, dtype)
+    return np.asarray(weights, dtype)
 
 
 def mean_guides(moments: jax.Array, guides: int) -> jax.Array:

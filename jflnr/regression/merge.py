@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
-
+from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.level import Fit, Grid, mean_guides, predict
 from jflnr.regression.pyramid import double, halve

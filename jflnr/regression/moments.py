@@ -10,16 +10,14 @@ from __future__ import annotations
 import functools
 from typing import TypeAlias
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.strips import cut, fill, step_of
 
 # One array `(H, W, Q)`, or several that make up the Q channels together, so that the layers of a
 # frame need not be copied into one.
-Guides: TypeAlias = jax.Array | tuple[jax.Array, ...]
+Guides: TypeAlias = "jax.Array | tuple[jax.Array, ...]"
 
 # Guides are cut to within this of their shift, so that sums of squares, regularised, do not
 # overflow in float32.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
-from jax import lax
+from jflnr.lazy import jax, jnp, lax
 
 
 def halve(planes: jax.Array) -> jax.Array:

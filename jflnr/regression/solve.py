@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.division import divide
 from jflnr.regression.elimination import SOLVERS, Solver, eliminate
 from jflnr.regression.moments import index_xx, index_xy
@@ -105,9 +103,11 @@ def solve(
     return system.models(SOLVERS[solver](system.correlation, system.right))
 
 
-def regularisation(method: Any) -> tuple[jax.Array, jax.Array]:
+def regularisation(method: Any) -> tuple[Any, Any]:
     """eps and eps', cut where they change nothing more and numbers after them would overflow."""
-    return jnp.minimum(method.eps, 1e4), jnp.clip(method.eps_prime, 1e-24, 1e30)
+    plain = isinstance(method.eps, float) and isinstance(method.eps_prime, float)
+    xp: Any = np if plain else jnp
+    return xp.minimum(method.eps, 1e4), xp.clip(method.eps_prime, 1e-24, 1e30)
 
 
 def solve_strips(

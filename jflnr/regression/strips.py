@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import jax
-import jax.numpy as jnp
-from jax import lax
-
 # Rows of pixels that are worked on at a time: enough to keep cores busy.
+from jflnr.lazy import jax, jnp, lax
+
 ROWS = 16
 
 

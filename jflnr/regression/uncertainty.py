@@ -6,9 +6,7 @@ import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
-
+from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, mean_guides, predict
 from jflnr.regression.pyramid import double
 from jflnr.regression.widths import Step

@@ -6,9 +6,7 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-import jax
-import jax.numpy as jnp
-
+from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
 from jflnr.regression.merge import interpolate, signal_share
 from jflnr.regression.pyramid import double

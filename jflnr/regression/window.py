@@ -10,11 +10,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.moments import index_xx, index_xy
 
 # Blocks on each side that the window extends over: two and a half of its standard deviations.

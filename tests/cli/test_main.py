@@ -51,7 +51,7 @@ def test_wrong_command_line(
 
 def python(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
 def test_module_runs_and_reports_in_one_line(tmp_path: Path) -> None:
@@ -67,6 +67,17 @@ def test_help_and_info_do_not_import_jax(frame_file: Path) -> None:
         code = f"import sys; sys.argv[1:] = {argv!r}\nimport jflnr.cli\ntry: jflnr.cli.main()\n"
         done = python("-c", code + "finally: print('jax' in sys.modules)")
         assert done.stdout.splitlines()[-1] == "False", done
+
+
+@pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
+def test_opencl_needs_no_jax(method: str, frame_file: Path, tmp_path: Path) -> None:
+    """It takes half of a second to import; neither are metrics that nobody asked for."""
+    pytest.importorskip("pyopencl")
+    heavy = "[n for n in ('jax', 'scipy.stats', 'skimage') if n in sys.modules]"
+    code = f"import sys; from jflnr.cli import main; main(); print({heavy})"
+    argv = ["denoise", str(frame_file), "--backend", "opencl", "--method", method]
+    done = python("-c", code, *argv, "-o", str(tmp_path / "out.exr"))
+    assert done.stdout.splitlines()[-1] == "[]", done
 
 
 def test_a_run_keeps_its_programs_for_the_next(frame_file: Path, tmp_path: Path) -> None:

@@ -1,0 +1,33 @@
+"""JAX, loaded when something of it is first used: the OpenCL back end starts without it."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import wrapt
+
+if TYPE_CHECKING:
+    import jax as jax
+    import jax.numpy as jnp
+    from jax import lax as lax
+else:
+
+    class _Lazy:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def __getattr__(self, attribute: str) -> Any:
+            return getattr(importlib.import_module(self.name), attribute)
+
+    jax, jnp, lax = _Lazy("jax"), _Lazy("jax.numpy"), _Lazy("jax.lax")
+
+T = TypeVar("T", bound=type)
+
+
+def pytree(dataclass: T) -> T:
+    """A dataclass that JAX knows as a pytree as soon as JAX is there, whoever loads it."""
+    wrapt.register_post_import_hook(
+        lambda module: module.tree_util.register_dataclass(dataclass), "jax"
+    )
+    return dataclass
