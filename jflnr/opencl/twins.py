@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jflnr.network.flnr import FLNR
 from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
@@ -11,16 +13,44 @@ from jflnr.opencl.flnr import flnr
 from jflnr.opencl.flr import flr
 from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.flr import FLR
-from jflnr.stages import Parts
+from jflnr.regression.picture import WholePicture
+from jflnr.stages import Parts, compose
 
-REGRESSIONS: dict[type, Any] = {FLR: flr, AdaptiveFLR: flr_adaptive, FLNR: flnr}
+REGRESSIONS: dict[type, Any] = {
+    FLR: flr,
+    AdaptiveFLR: flr_adaptive,
+    FLNR: flnr,
+    WholePicture: flr_adaptive,
+}
 
 
-def regress(method: Any, images: Parts, context: Context, **options: Any) -> Any:
-    """`jflnr.stages.regress` on the device. images: as the method's `images` makes them.
+def regress(
+    method: Any,
+    images: Parts,
+    context: Context,
+    composed: bool = True,
+    out: Any | None = None,
+    **options: Any,
+) -> Any:
+    """`jflnr.stages.regress` on the device; a picture is composed on the host.
 
     options: as of `flr`. Returns `(H, W, C)`.
     """
-    given = {name: image for name, image in images.items() if image is not None}
-    target, guides = given.pop("target"), given.pop("guides")
-    return REGRESSIONS[type(method)](target, guides, method, context=context, **given, **options)
+    others = ("guides_map", "weight")
+    given = {name: images[name] for name in others if images.get(name) is not None} | options
+    later = composed and any(stage.composes for stage in method.stages())
+    light = REGRESSIONS[type(method)](
+        images["target"],
+        images["guides"],
+        method,
+        context=context,
+        out=None if later else out,
+        **given,
+    )
+    if not later:
+        return light
+    picture = np.asarray(compose(method, images | {"image": light}))
+    if out is None:
+        return picture
+    np.copyto(out, picture, casting="same_kind")
+    return out
