@@ -140,13 +140,13 @@ def step(
     kept = [name for some in averaged for name in PARTS[some]]
 
     def average(parts: stages.Parts, name: str, side: int) -> Any:
-        planes = jnp.moveaxis(parts[name], -1, 0) if side == 1 else parts[name]
+        planes = jnp.moveaxis(parts[name], -1, 0) if side == 0 else parts[name]
         image = jnp.moveaxis(planes.reshape(-1, *planes.shape[-2:]), 0, -1)
         again = name == "image" and len(averaged) > 1
-        past = moved(state[name], frame, before, side)
+        past = moved(state[name], frame, before, side or 1)
         state[name] = accumulate(past, image, LEAST_OUTPUT if again else LEAST)
         mean = state[name].mean
-        return mean if side == 1 else jnp.moveaxis(mean, -1, 0).reshape(planes.shape)
+        return mean if side == 0 else jnp.moveaxis(mean, -1, 0).reshape(planes.shape)
 
     def averaging(stage: Stage) -> Stage:
         def with_history(method: Any, parts: stages.Parts, known: Known) -> stages.Parts:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import importlib
 import sys
@@ -16,7 +15,7 @@ from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
 from jflnr.lazy import jax
-from jflnr.methods import BACKENDS, DEFAULT, method_of
+from jflnr.methods import BACKENDS, default_of, method_of
 from jflnr.stages import Parts, regress
 
 if TYPE_CHECKING:
@@ -47,37 +46,38 @@ def _native(frame: Frame) -> Frame:
             return layer
         return layer.astype(np.float16 if layer.dtype.itemsize == 2 else np.float32, copy=False)
 
-    layers = {name: native(layer) for name, layer in vars(frame).items() if layer is not None}
-    return dataclasses.replace(frame, **layers)
+    return frame.map(native)
 
 
 def denoise(
     frame: Frame,
-    method: Any = DEFAULT,
+    method: Any = None,
     *,
     backend: str = "jax",
     guides: Sequence[str] | None = None,
     tile: int | None = None,
     **options: Any,
 ) -> Any:
-    """Denoise the indirect light of a frame.
+    """Denoise the indirect light of a frame, or the whole picture of another program.
 
     frame: as from `read_frame`. Its `indirect` may have any number of channels C: several light
     groups side by side are denoised together, and their results sum to the denoised sum. For `flr`
     it may also be smaller than the other layers by a whole factor; the result then has their size.
-    method: an object such as `FLR(sigma=12)`, or a name: `flr` (section 3.2 of the paper),
-    `flr-adaptive` (docs/adaptive.md), `flnr`, the same steered by a network, `flnr-small` or
-    `flnr-tiny`, by a smaller one (docs/flnr.md), `bmfr`, as in the first frame of a sequence
-    (docs/bmfr.md), or `auto`, the smallest model that is good enough for the frame
-    (docs/select.md). options: fields of the method to replace, such as `block=4`, the pixels on a
-    side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
+    method: an object such as `FLR(sigma=12)`, or a name: `picture`, the whole picture
+    (docs/layouts.md), `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`,
+    the same steered by a network, `flnr-small` or `flnr-tiny`, by a smaller one (docs/flnr.md),
+    `bmfr`, as in the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that
+    is good enough for the frame (docs/select.md). If None, `picture` where the frame has a
+    `beauty`, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
+    on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
     tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
     (docs/large.md); on all of them if None.
     Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
-    Returns `(H, W, C)` float32, demodulated indirect radiance; with the option `with_error=True` of
-    `flr-adaptive` also its standard error, `(H, W, 1)`: nine pixels of ten are within 1.645 of the
+    Returns `(H, W, C)` float32, demodulated indirect radiance, of `picture` the picture itself, RGB
+    or, where the frame has an `alpha`, RGBA; with the option `with_error=True` of `flr-adaptive`
+    and `picture` also its standard error, `(H, W, 1)`: nine pixels of ten are within 1.645 of the
     truth. They are arrays of numpy if the frame's are, else of JAX.
 
     Raises `ValueError` or `TypeError` naming the argument, also if no pixel can be used. Warns if
@@ -96,7 +96,7 @@ class Denoiser:
 
     def __init__(
         self,
-        method: Any = DEFAULT,
+        method: Any = None,
         *,
         backend: str = "jax",
         guides: Sequence[str] | None = None,
@@ -105,26 +105,38 @@ class Denoiser:
         **options: Any,
     ) -> None:
         checks.choice("backend", backend, BACKENDS)
-        self.method, self.backend, self.guides = method_of(method, **options), backend, guides
-        if backend not in self.method.backends:
-            raise ValueError(f"method {self.method.name} runs on the jax backend only")
-        if guides is not None and (own := getattr(self.method, "features", None)):
-            raise ValueError(
-                f"method {self.method.name} has its own features, {' and '.join(own)}; guides are "
-                "for other methods"
-            )
         if tile is not None:
             checks.positive_integer("tile", tile)
-            if not hasattr(self.method, "stages"):
-                raise ValueError(f"method {self.method.name} does not work in tiles")
+        self.backend, self.guides, self.options = backend, guides, options
         self.tile, self.state, self._device = tile, None, device
+        self.method = None if method is None else self._checked(method_of(method, **options))
+
+    def _checked(self, method: Any) -> Any:
+        """The method, if it can do what is asked for."""
+        if self.backend not in method.backends:
+            raise ValueError(f"method {method.name} runs on the jax backend only")
+        if self.guides is not None and (own := getattr(method, "features", None)):
+            raise ValueError(
+                f"method {method.name} has its own features, {', '.join(own)}; guides are for "
+                "other methods"
+            )
+        if self.tile is not None and not hasattr(method, "stages"):
+            raise ValueError(f"method {method.name} does not work in tiles")
+        return method
+
+    def method_for(self, frame: Frame) -> Any:
+        """The method that denoises a frame."""
+        if self.method is not None:
+            return self.method
+        return self._checked(method_of(default_of(frame), **self.options))
 
     @_own_settings
     def __call__(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise a frame by itself; its light is written to `out`, if given, and returned."""
         frame = _native(frame)
-        names, inputs = prepare(frame, self.guides, self.method)
-        method = self.method.for_frame(inputs, names)
+        method = self.method_for(frame)
+        names, inputs = prepare(frame, self.guides, method)
+        method = method.for_frame(inputs, names)
         if hasattr(method, "step"):
             light = self._step(self.start(frame), frame)[1]
             return _given({"image": light}, frame, out)
@@ -178,7 +190,8 @@ class Denoiser:
         """
         from jflnr.large import tiled
 
-        method = self.method.for_frame(rows.shapes(), names)
+        shapes = rows.shapes()
+        method = self.method_for(shapes).for_frame(shapes, names)
         if self.backend == "jax":
             return tiled.strips(rows, method, names, tile, folder)
         return tiled.overlapping(rows, method, names, tile, self._on_device(method))
@@ -191,23 +204,23 @@ class Denoiser:
 
     def start(self, frame: Frame) -> Any:
         """The state before the first frame of a shot, of which only the shapes count."""
-        return self._over_time[0](frame)
+        return self._over_time(frame)[0](frame)
 
     def _step(self, state: Any, frame: Frame) -> tuple[Any, Any]:
-        return self._over_time[1](state, frame)
+        return self._over_time(frame)[1](state, frame)
 
-    @functools.cached_property
-    def _over_time(self) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    def _over_time(self, frame: Frame) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """`start` and `step`, the method's own if it has them."""
-        own, name = hasattr(self.method, "step"), "jflnr.temporal"
+        method, name = self.method_for(frame), "jflnr.temporal"
+        own = hasattr(method, "step")
         if self.backend == "jax" and own:
-            return self.method.start, self.method.step
+            return method.start, method.step
         options: dict[str, Any] = {}
         if self.backend == "opencl":
             options["context"] = self.context
-            name = f"jflnr.opencl.{self.method.name if own else 'temporal'}"
+            name = f"jflnr.opencl.{method.name if own else 'temporal'}"
         home, guides = importlib.import_module(name), {} if own else {"guides": self.guides}
-        step = functools.partial(home.step, method=self.method, **guides, **options)
+        step = functools.partial(home.step, method=method, **guides, **options)
         return functools.partial(home.start, **options), step
 
 

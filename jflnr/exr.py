@@ -55,6 +55,7 @@ class Attributes(NamedTuple):
     window: Window
     others: dict[str, Any]  # as the program that wrote the file named them
     size: tuple[int, int]  # height and width in pixels
+    names: tuple[str, ...] = ()  # of all channels
 
 
 def layer_of(channel: str) -> str:
@@ -84,6 +85,7 @@ def read_attributes(path: PathLike) -> Attributes:
         window=Window((int(x0), int(y0)), (int(low[0]), int(low[1]), int(high[0]), int(high[1]))),
         others={name: value for name, value in header.items() if name not in STRUCTURE},
         size=(int(y1) - int(y0) + 1, int(x1) - int(x0) + 1),
+        names=tuple(_named(parts)),
     )
 
 
@@ -99,11 +101,7 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
     parts = _read_parts(path, header_only=False)
     if len(parts) != len(announced):
         raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
-    channels: dict[str, np.ndarray] = {}
-    for part in parts:
-        for name, pixels in part.channels.items():
-            layered = "." in name or len(parts) == 1
-            channels[name if layered and name not in channels else f"{part.name}.{name}"] = pixels
+    channels = _named(parts)
     check_sizes(path, channels)
     if len({tuple(map(int, part.header["dataWindow"][0])) for part in parts}) > 1:
         raise ValueError(f"{path}: its parts do not start at the same pixel")
@@ -229,6 +227,16 @@ class _Part(NamedTuple):
     channels: dict[str, np.ndarray]
 
 
+def _named(parts: list[_Part]) -> dict[str, np.ndarray]:
+    """The channels of all parts."""
+    channels: dict[str, np.ndarray] = {}
+    for part in parts:
+        for name, pixels in part.channels.items():
+            layered = "." in name or len(parts) == 1
+            channels[name if layered and name not in channels else f"{part.name}.{name}"] = pixels
+    return channels
+
+
 def _read_parts(path: Path, header_only: bool) -> list[_Part]:
     """The parts that OpenEXR could read. It leaves out those whose pixels are damaged."""
     _check_file(path)
@@ -239,7 +247,10 @@ def _read_parts(path: Path, header_only: bool) -> list[_Part]:
                 _Part(
                     part.name(),
                     {n: texts.get(v, v) if isinstance(v, str) else v for n, v in header.items()},
-                    {channel.name: channel.pixels for channel in part.channels.values()},
+                    {
+                        c.name: c.pixels
+                        for c in (header["channels"] if header_only else part.channels.values())
+                    },
                 )
                 for part, header in zip(
                     file.parts, map(file.header, range(len(file.parts))), strict=True

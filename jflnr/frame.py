@@ -5,8 +5,9 @@ Layers and their meaning are DESIGN.md's ("The frame").
 
 from __future__ import annotations
 
+import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -26,7 +27,8 @@ HALF_MAX = float(np.finfo(np.float16).max)
 class Frame:
     """The layers of one frame, each (H, W, C) float32 or None; a pytree.
 
-    Light is demodulated: multiplied by `albedo` it is reflected radiance.
+    Light is demodulated: multiplied by `albedo` it is reflected radiance. Of another program's
+    picture, `albedo`, `indirect`, `direct` and `emission` are its diffuse light and the rest.
     """
 
     indirect: Array  # (H, W, 3) noisy indirect light
@@ -41,6 +43,19 @@ class Frame:
     reference: Array | None = None  # (H, W, 3) converged indirect light
     reference_a: Array | None = None  # (H, W, 3) mean of the first half of its samples
     motion: Array | None = None  # (H, W, 2) pixels to where this point was one frame ago
+
+    # Of another program's whole picture, each as noisy as the program wrote it.
+    beauty: Array | None = None  # (H, W, 3) the picture
+    alpha: Array | None = None  # (H, W, 1) share of the pixel that is covered; None for all of it
+    emitted: Array | None = None  # (H, W, 3) of the beauty: what seen surfaces emit
+    environment: Array | None = None  # (H, W, 3) of the beauty: what is seen behind all surfaces
+    seen_albedo: Array | None = None  # (H, W, 3) of what is seen, also in mirrors and through glass
+    seen_normal: Array | None = None  # (H, W, 3) likewise
+
+    def map(self, change: Callable[[Array], Array]) -> Frame:
+        """The frame with every layer changed."""
+        there = {name: change(layer) for name, layer in vars(self).items() if layer is not None}
+        return dataclasses.replace(self, **there)
 
 
 def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | None = None) -> Frame:

@@ -28,15 +28,22 @@ from jflnr import checks
 HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "flr": ("jflnr.regression.flr", "FLR", {}),
     "flr-adaptive": ("jflnr.regression.adaptive", "AdaptiveFLR", {}),
+    "picture": ("jflnr.regression.picture", "WholePicture", {}),
     "flnr-tiny": ("jflnr.network.flnr", "FLNR", {"size": "tiny"}),
     "flnr-small": ("jflnr.network.flnr", "FLNR", {"size": "small"}),
     "flnr": ("jflnr.network.flnr", "FLNR", {}),
     "bmfr": ("jflnr.bmfr.pipeline", "BMFR", {}),
     "auto": ("jflnr.auto.method", "Auto", {}),
 }
-DEFAULT = "flr"
+# What denoises a frame if nobody says: pictures of other programs are denoised whole.
+DEFAULT, WHOLE = "flr", "picture"
 METHODS = tuple(HOMES)
 BACKENDS = ("jax", "opencl")
+
+
+def default_of(frame: Any) -> str:
+    """The name of the method that denoises a frame if nobody says."""
+    return DEFAULT if frame.beauty is None else WHOLE
 
 
 def method_of(method: Any = DEFAULT, **options: Any) -> Any:

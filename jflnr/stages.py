@@ -19,12 +19,12 @@ class Stage:
     """One pure function, and what a driver must know to run it on a part of a frame.
 
     run: from the method, the arrays and what is known, all of them of one part, to new arrays.
-    gives: their names, each with the side in pixels of the blocks that it is on; 1 for pixels.
+    gives: their names, each with the side in pixels of the blocks that it is on; 0 for pixels.
     reads: what it takes of what stages before it gave. pixels: whether it takes the images too.
     reach: pixels beyond a part that its results depend on. align: parts begin at multiples of so
     many pixels. totals: planes `(n, ...)` whose sums over the frame are wanted, given beside the
     others, with the side of their blocks. learn: what those sums, `(n,)` each, add to what is
-    known.
+    known. composes: whether it puts the light into the picture, after any average over time.
     """
 
     run: Callable[[Any, Parts, Known], Parts]
@@ -35,6 +35,7 @@ class Stage:
     align: int = 1
     totals: tuple[tuple[str, int], ...] = ()
     learn: Callable[[Any, Known, dict[str, Any]], Known] | None = None
+    composes: bool = False
 
 
 def run(stages: Sequence[Stage], method: Any, parts: Parts, known: Known) -> tuple[Parts, Known]:
@@ -48,11 +49,21 @@ def run(stages: Sequence[Stage], method: Any, parts: Parts, known: Known) -> tup
     return parts, known
 
 
-def regress(method: Any, images: Parts) -> Parts:
+def regress(method: Any, images: Parts, composed: bool = True) -> Parts:
     """What the last stage of a method gives for a whole frame: `image`, `(H, W, C)`, and more.
 
-    images: as the method's `images` makes them.
+    images: as the method's `images` makes them. composed: whether the light is put into the
+    picture, if the method does so.
     """
-    stages = method.stages()
+    stages = [stage for stage in method.stages() if composed or not stage.composes]
     parts, _ = run(stages, method, images, method.known(images))
     return {name: parts[name] for name, _ in stages[-1].gives}
+
+
+def compose(method: Any, parts: Parts) -> Any | None:
+    """The picture with `image`, denoised light, in it; None for a method of light alone.
+
+    parts: what the method's `images` made, and the light.
+    """
+    stages = [stage for stage in method.stages() if stage.composes]
+    return run(stages, method, parts, {})[0]["image"] if stages else None

@@ -46,7 +46,7 @@ class Means:
     def stages(self) -> tuple[Stage, ...]:
         return (
             Stage(means, (("means", self.block),), pixels=True),
-            Stage(shown, (("image", 1),), ("means",), pixels=True, reach=self.block),
+            Stage(shown, (("image", 0),), ("means",), pixels=True, reach=self.block),
         )
 
 

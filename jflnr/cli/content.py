@@ -3,16 +3,20 @@
 import argparse
 import dataclasses
 from collections import Counter
-from collections.abc import Iterable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jflnr import layouts
+from jflnr.methods import WHOLE
 
 if TYPE_CHECKING:
+    from jflnr.denoising import Denoiser
     from jflnr.frame import Frame
+
+# So much of its light a picture may lose or gain without a word.
+LOST = 0.02
 
 
 def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
@@ -20,40 +24,58 @@ def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
     return arguments.spp if layouts.native.spp_present(source.channels) else None
 
 
-def split(light: np.ndarray) -> dict[str, np.ndarray]:
-    """Denoised light `(H, W, 3)` or `(H, W, 6)` by layer."""
-    lights = {"indirect": light[..., :3]}
-    return lights | ({"direct": light[..., 3:]} if light.shape[-1] > 3 else {})
+class Result(NamedTuple):
+    """What became of a frame.
+
+    picture: `(H, W, 3)`. lights: denoised light, `(H, W, 3)`, by layer. lit: the picture without
+    what shines by itself. alpha: `(H, W, 1)` if it was denoised too. error: `(H, W, 1)`, of the
+    brightness, if asked for.
+    """
+
+    picture: np.ndarray
+    lights: dict[str, np.ndarray]
+    lit: np.ndarray
+    alpha: np.ndarray | None = None
+    error: np.ndarray | None = None
 
 
-def with_direct(frame: "Frame", path: Path) -> "Frame":
-    """The frame whose light to denoise, (H, W, 6), is the indirect and the direct one."""
-    if frame.direct is None:
-        raise ValueError(f"{path}: --direct needs a layer of direct light, and there is none")
-    light = np.concatenate([frame.indirect, frame.direct], axis=-1)
-    return dataclasses.replace(frame, indirect=light)
-
-
-def picture_of(frame: "Frame", lights: dict[str, np.ndarray]) -> np.ndarray:
-    """The picture `(H, W, 3)` with the denoised light in it."""
+def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
+    """The picture with denoised light in it. given: by name, what the method's last stage gave."""
     from jflnr.frame import composite
 
-    frame = dataclasses.replace(frame, direct=lights.get("direct", frame.direct))
-    return np.asarray(composite(frame, lights["indirect"]), np.float32)
+    image = np.asarray(given["image"], np.float32)
+    if method.name == WHOLE:
+        shining = sum(own for own in (frame.emitted, frame.environment) if own is not None)
+        picture, alpha = image[..., :3], image[..., 3:] if image.shape[-1] > 3 else None
+        return Result(picture, {}, picture - shining, alpha, given.get("error"))
+    picture, lit = (
+        np.asarray(composite(some, image), np.float32)
+        for some in (frame, dataclasses.replace(frame, emission=None))
+    )
+    return Result(picture, {"indirect": image}, lit, error=given.get("error"))
 
 
-def about_of(frame: "Frame", settings: dict[str, Any], spp: int | None) -> dict[str, Any]:
+def channels_of(
+    source: layouts.Source, frame: "Frame", result: Result, arguments: argparse.Namespace
+) -> dict[str, np.ndarray]:
+    """What to write."""
+    mask = None if frame.mask is None else np.asarray(frame.mask)
+    images = result.picture, result.lights, mask, result.alpha
+    channels = layouts.output_channels(source, *images, arguments.channels)
+    return channels if result.error is None else channels | {"error.Y": result.error[..., 0]}
+
+
+def about_of(frame: "Frame", denoiser: "Denoiser", spp: int | None) -> dict[str, Any]:
     """What was done, for the record and for the header of the output."""
-    from jflnr.images.guides import choose
+    from jflnr.images.inputs import guides_of
 
-    method = settings["method"]
-    own = getattr(method, "features", None)
+    method = denoiser.method_for(frame)
     names = ("sigma", "eps", "eps_prime") if method.name == "flr" else ()
     return {
         "method": method.name,
-        "backend": settings["backend"],
+        "backend": denoiser.backend,
         "spp": spp,
-        "guides": list(own or choose(frame, settings["guides"])),
+        "guides": guides_of(frame, denoiser.guides, method),
         **({"block": method.block} if hasattr(method, "block") else {}),
         **{name: float(getattr(method, name)) for name in names},
     }
@@ -66,22 +88,24 @@ class Pixels:
     not_finite: Counter[str] = dataclasses.field(default_factory=Counter)
     denoised: int = 0
     why: str = ""
+    light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(2))
 
-    def add(self, frame: "Frame") -> None:
+    def add(self, frame: "Frame", whole: bool, picture: np.ndarray) -> None:
+        """whole: whether the frame was denoised as a picture."""
         from jflnr.frame import not_finite
+        from jflnr.regression.picture import WholePicture
 
-        self.not_finite.update(not_finite(frame))
-        count, why = layouts.denoised(vars(frame))
+        names = WholePicture.features if whole else layouts.LAYERS
+        counts = not_finite(frame)
+        self.not_finite.update({name: n for name, n in counts.items() if name in names})
+        count, why = layouts.denoised(vars(frame), whole)
         self.denoised, self.why = self.denoised + count, self.why or why
+        if whole:
+            images = np.asarray(frame.beauty), picture
+            self.light += np.array([np.nansum(image, dtype=np.float64) for image in images])
 
 
-def warnings_of(
-    caught: Iterable[Any],
-    pixels: Pixels,
-    about: dict[str, Any],
-    frame: "Frame",
-    arguments: argparse.Namespace,
-) -> list[str]:
+def warnings_of(caught: Iterable[Any], pixels: Pixels) -> list[str]:
     """What a user should know of a frame that was denoised. caught: what Python was warned of."""
     said = list(dict.fromkeys(str(warning.message) for warning in caught))
     if counts := pixels.not_finite:
@@ -89,7 +113,10 @@ def warnings_of(
         said.append(f"pixels that are NaN or infinite (the fit leaves them out): {listed}")
     if not pixels.denoised:
         said.append(pixels.why)
-    # Our own files hold converged direct light; other programs' is as noisy as the rest.
-    if about["spp"] is None and frame.direct is not None and not arguments.direct:
-        said.append("Direct light is left as it was rendered; --direct denoises it too.")
+    before, after = pixels.light
+    if before > 0 and not abs(after / before - 1) < LOST:
+        said.append(
+            f"the picture holds {after / before:.1%} of the light of its input: pixels far "
+            "brighter than those around them (fireflies) count less"
+        )
     return said

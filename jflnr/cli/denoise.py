@@ -1,8 +1,9 @@
 """denoise: denoise frames, and write the light and the picture as EXR.
 
-Frames of Blender (Cycles), Mitsuba 3 and pbrt-v4 are read as they are; `jflnr info` says how.
-Each output holds the picture, put together again with the denoised light, as plain R, G, B (and A
-where the input has it), and that light, demodulated, as the layer `indirect`.
+Frames of Blender (Cycles), Mitsuba 3 and pbrt-v4 are read as they are; `jflnr info` says how. Of
+them the whole picture is denoised, of our own, and by any method but `picture`, diffuse indirect
+light. Each output holds the picture as plain R, G, B (and A where the input has it), and indirect
+light that was denoised, demodulated, as the layer `indirect`.
 
 OUT is a file when IN is one file and OUT ends with .exr; otherwise it is a folder, and each output
 has its input's name. An output that exists is kept, which is no error, unless --overwrite is given.
@@ -26,11 +27,11 @@ from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import remarks, summary, throughput
-from jflnr.methods import BACKENDS, DEFAULT, HOMES
+from jflnr.methods import BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
-  jflnr denoise render.exr -o out/ --direct --png --method flr-adaptive
+  jflnr denoise render.exr -o out/ --method flr-adaptive        its diffuse indirect light only
   jflnr denoise shot/ -o clean/ --temporal --method flr-adaptive      a film, without flicker
   jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with the clean ones
   jflnr denoise room.exr -o out/ --method auto --explain    what each frame needs, and why
@@ -45,9 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="file or folder to write")
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
-    add("--direct", action="store_true", help="denoise direct light too, where it is told apart")
     listed = ", ".join(HOMES)
-    add("--method", default=DEFAULT, choices=HOMES, metavar="M", help=f"{listed} ({DEFAULT})")
+    usual = f"{WHOLE} for other programs' files, {DEFAULT} for our own"
+    add("--method", choices=HOMES, metavar="M", help=f"{listed} ({usual})")
     add(
         "--explain",
         action="store_true",
@@ -63,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--error-map",
         action="store_true",
-        help="with flr-adaptive: add its standard error as the layer `error`",
+        help="with flr-adaptive and picture: add the standard error as the layer `error`",
     )
     add("--temporal", action="store_true", help="use the frames before: a folder is a shot")
     add(
@@ -103,8 +104,6 @@ def run(arguments: argparse.Namespace) -> int:
 
     from jflnr.large import memory
 
-    if arguments.error_map and (arguments.method, arguments.backend) != ("flr-adaptive", "jax"):
-        raise ValueError("--error-map needs --method flr-adaptive on the jax backend")
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
     check_apart([arguments.history], [*outputs, *(job.source for job in jobs)])

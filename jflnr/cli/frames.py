@@ -1,7 +1,6 @@
 """One frame of `jflnr denoise` in three stages: read, denoise, write."""
 
 import argparse
-import dataclasses
 import functools
 import json
 import time
@@ -17,22 +16,23 @@ from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, sentence
 from jflnr.cli.content import (
     Pixels,
+    Result,
     about_of,
-    picture_of,
-    split,
+    channels_of,
+    result_of,
     spp_of,
     warnings_of,
-    with_direct,
 )
 from jflnr.cli.jobs import Job, make_folder
+from jflnr.methods import DEFAULT, WHOLE, method_of
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
 
 # What became of a frame, as JSON can hold it.
 Record = dict[str, Any]
-# Denoised light, and its standard error if that was asked for.
-Light = tuple[np.ndarray, np.ndarray | None]
+# What a denoiser gives, by name: `image`, and what else was asked for.
+Given = dict[str, np.ndarray]
 
 
 class Loaded(NamedTuple):
@@ -45,13 +45,12 @@ class Loaded(NamedTuple):
 
 
 class Denoised(NamedTuple):
-    """A frame with its denoised light, by layer, and that light's standard error if asked for."""
+    """A frame, and what became of it."""
 
     job: Job
     source: layouts.Source
     frame: "Frame"
-    lights: dict[str, np.ndarray]
-    error: np.ndarray | None
+    result: Result
     about: dict[str, Any]
     record: Record
 
@@ -100,12 +99,12 @@ class Worker:
         return self._reported(job, lambda: self._read(job))
 
     def denoise(
-        self, loaded: Loaded | Record, light: Callable[["Frame"], Light] | None = None
+        self, loaded: Loaded | Record, given: Callable[["Frame"], Given] | None = None
     ) -> Denoised | Record:
-        """light: what denoises instead of the denoiser; it may be called twice."""
+        """given: what denoises instead of the denoiser; it may be called twice."""
         if isinstance(loaded, dict):
             return loaded
-        return self._reported(loaded.job, lambda: self._denoise(loaded, light or self._light))
+        return self._reported(loaded.job, lambda: self._denoise(loaded, given or self._given))
 
     def write(self, denoised: Denoised | Record) -> Record:
         if isinstance(denoised, dict):
@@ -125,75 +124,81 @@ class Worker:
         from jflnr.large import memory
 
         start = time.perf_counter()
-        size, method = exr.read_attributes(job.source).size, self.settings["method"]
+        attributes, method = exr.read_attributes(job.source), self.settings["method"]
         make_folder(job.target)
         bound = self.memory or memory.free()
-        if tile := memory.tile_for(*size, bound, self.at_once, method):
+        if method is None:
+            other = layouts.is_picture(attributes.names) or "beauty" in dict(self.arguments.map)
+            method = method_of(WHOLE if other else DEFAULT)
+        if tile := memory.tile_for(*attributes.size, bound, self.at_once, method):
             return Loaded(job, tile=tile)
         source = layouts.load(job.source, self.arguments.spp, dict(self.arguments.map))
         self.exr_seconds["read"] += time.perf_counter() - start
         return Loaded(job, source, frame_of(source))
 
     def _denoise(
-        self, loaded: Loaded, denoise_light: Callable[["Frame"], Light]
+        self, loaded: Loaded, denoise_frame: Callable[["Frame"], Given]
     ) -> Denoised | Record:
         from jflnr.metrics import measure
 
         job, source, frame, tile = loaded
-        arguments, settings = self.arguments, self.settings
+        arguments = self.arguments
         if source is None or frame is None:
             from jflnr.cli.strips import denoise_in_strips
 
             assert tile is not None
             return _record(job) | denoise_in_strips(job, self.denoiser, arguments, tile)
-        noisy = with_direct(frame, job.source) if arguments.direct else frame
-        if arguments.reference and frame.reference is None:
+        method = self.denoiser.method_for(frame)
+        whole = method.name == WHOLE
+        if arguments.reference and (frame.reference is None or whole):
             raise ValueError(
-                f"{job.source}: --reference needs a layer reference, and there is none"
+                f"{job.source}: --reference needs indirect light with a layer reference, and there "
+                "is none; `jflnr metrics` compares pictures"
             )
-        shapes = tuple(getattr(image, "shape", None) for image in vars(noisy).values())
+        shapes = tuple(getattr(image, "shape", None) for image in vars(frame).values())
         times = [time.perf_counter()]
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", UserWarning)
             # The first frame of a kind is denoised twice, to tell compiling from denoising.
             for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
-                light, light_error = denoise_light(noisy)
+                given = denoise_frame(frame)
                 times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
-        about = about_of(frame, settings, spp_of(source, arguments))
-        lights = split(light)
+        about = about_of(frame, self.denoiser, spp_of(source, arguments))
+        result = result_of(frame, method, given)
         pixels = Pixels()
-        pixels.add(frame)
+        pixels.add(frame, whole, result.picture)
         record = {
-            "width": light.shape[1],
-            "height": light.shape[0],
+            "width": result.picture.shape[1],
+            "height": result.picture.shape[0],
             "layout": source.layout.program,
             "notes": list(source.layout.notes),
             **about,
             "seconds": times[-1] - times[-2],
             "compile_seconds": times[-2] - times[0],
-            "warnings": warnings_of(caught, pixels, about, frame, arguments),
+            "warnings": warnings_of(caught, pixels),
         }
         if arguments.profile:
             from jflnr.opencl.context import default_context
             from jflnr.opencl.profile import profile
 
-            rows = profile(default_context(), lambda: denoise_light(noisy))
+            rows = profile(default_context(), lambda: denoise_frame(frame))
             record["profile"] = [row._asdict() for row in rows]
         if arguments.explain:
             from jflnr.cli.explain import explain
 
-            record["plan"] = explain(job.explanation, noisy, settings["guides"])
+            record["plan"] = explain(job.explanation, frame, self.settings["guides"])
         if arguments.reference:
-            images = {"noisy": frame.indirect, "denoised": lights["indirect"]}
+            images = {"noisy": frame.indirect, "denoised": result.lights["indirect"]}
             record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
-        return Denoised(job, source, frame, lights, light_error, about, record)
+        return Denoised(job, source, frame, result, about, record)
 
-    def _light(self, frame: "Frame") -> Light:
+    def _given(self, frame: "Frame") -> Given:
         given = self.denoiser(frame)
-        light, error = given if isinstance(given, tuple) else (given, None)
-        return np.asarray(light, np.float32), error
+        if isinstance(given, tuple):
+            return dict(zip(("image", "error"), given, strict=True))
+        return {"image": given}
 
     def _write(self, done: Denoised) -> Record:
         start = time.perf_counter()
@@ -220,19 +225,13 @@ def _write(done: Denoised, arguments: argparse.Namespace) -> None:
     from jflnr.cli.preview import write_preview
     from jflnr.metrics import exposure
 
-    job, source, frame, lights, error, about, _ = done
-    picture = picture_of(frame, lights)
+    job, source, frame, result, about, _ = done
     missing = lambda path: arguments.overwrite or not path.exists()
-    mask = None if frame.mask is None else np.asarray(frame.mask)
-    channels = layouts.output_channels(source, picture, lights, mask, arguments.channels)
-    if error is not None:
-        channels["error.Y"] = error[..., 0]
+    channels = channels_of(source, frame, result, arguments)
     comments = json.dumps(source.header | {"denoiser": about})
     attributes = source.attributes
     if missing(job.target):
         exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
     if arguments.png and missing(job.preview):
         # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        reflected = dataclasses.replace(frame, emission=None)
-        lit = picture_of(reflected, lights)
-        write_preview(job.preview, picture, exposure(np.nan_to_num(lit)))
+        write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))

@@ -12,12 +12,17 @@ import numpy as np
 
 from jflnr import exr, layouts
 from jflnr.cli.common import add_map, table, to_json
+from jflnr.methods import WHOLE, default_of
 
 EXAMPLES = """\
   jflnr info render.exr
   jflnr info render.exr --map albedo=diffuse.colour
   jflnr info render.exr --json
 """
+
+
+# Layers of a frame, and those of the layout that they are made of.
+ELSEWHERE = {"emitted": "emission", "seen_albedo": "albedo"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -96,17 +101,26 @@ def _use(source: layouts.Source) -> dict[str, Any]:
         images = layouts.assemble(source)
     except ValueError as error:
         return use | {"usable": False, "why": str(error)}
-    pixels, why = layouts.denoised(images)
+    from jflnr.frame import Frame
+    from jflnr.images.inputs import guides_of
+    from jflnr.methods import method_of
+
+    frame = Frame(**images)  # type: ignore[arg-type]
+    method = default_of(frame)
+    whole = method == WHOLE
+    pixels, why = layouts.denoised(images, whole)
     present = [layer for layer, image in images.items() if image is not None]
     named = {n: c for n, c in layout.channels.items() if set(c) <= set(source.channels)}
+    parts = ("emitted", "environment") if whole else ("albedo", "direct", "emission")
     return use | {
         "usable": True,
+        "method": method,
         "spp": layouts.native.spp_present(source.channels),
-        "light": layout.light,
+        "light": "beauty" if whole else layout.light,
         "pixels": pixels,
         "warnings": [why] if why else [],
-        "guides": [name for name in ("normal", "depth", "ao") if name in present],
-        "composite": [name for name in ("albedo", "direct", "emission") if name in present],
+        "guides": guides_of(frame, None, method_of(method)),
+        "composite": [name for name in parts if name in present],
         "reference": "reference" in present,
         "absent": [layer for layer in layouts.LAYERS if layer not in present],
         "channels": {layer: list(channels) for layer, channels in named.items()},
@@ -118,15 +132,18 @@ def _use_text(use: dict[str, Any]) -> list[str]:
     if not use["usable"]:
         return [f"layout: {use['layout']}; jflnr denoise cannot use it: {use['why']}", *notes]
     light = exr.layer_of(use["channels"][use["light"]][0]) or "plain R, G, B"
-    noisy = [f"indirect_{spp} (--spp {spp})" for spp in use["spp"]] or [light]
-    rest = "the rest of the picture" if "beauty" in use["channels"] else "emission"
-    parts = [rest if name == "emission" else name for name in use["composite"]]
+    if whole := use["method"] == WHOLE:
+        noisy = [f"the whole picture, {light}"]
+    else:
+        noisy = [f"indirect_{spp} (--spp {spp})" for spp in use["spp"]] or [light]
+    denoised = "denoised picture" if whole else "denoised indirect"
     return [
         f"layout: {use['layout']}; jflnr denoise would use",
+        f"  method       {use['method']}, if no other is named",
         f"  noisy light  {', '.join(noisy)}",
         f"  pixels       {use['pixels']} will be denoised",
         f"  guides       {', '.join(_named(name, use['channels']) for name in use['guides'])}",
-        f"  composite    {', '.join(['denoised indirect', *parts])}",
+        f"  composite    {', '.join([denoised, *use['composite']])}",
         f"  reference    {'yes (--reference)' if use['reference'] else 'none'}",
         f"  absent       {', '.join(use['absent']) or 'nothing'}",
         *notes,
@@ -135,8 +152,9 @@ def _use_text(use: dict[str, Any]) -> list[str]:
 
 def _named(guide: str, channels: dict[str, list[str]]) -> str:
     """The guide, with where it comes from unless that is a layer of the same name."""
-    if guide not in channels:
-        return f"{guide} (from position)"
-    first = channels[guide][0]
+    name = guide if guide in channels else ELSEWHERE.get(guide)
+    if name not in channels:
+        return f"{guide} (from position)" if guide == "depth" else guide
+    first = channels[name][0]
     source = exr.layer_of(first) or first
     return guide if source == guide else f"{guide} ({source})"

@@ -3,18 +3,30 @@
 import argparse
 from typing import Any
 
+# Options that are of the default method, if no other is named.
+OF_DEFAULT = ("guides", "params", "sigma", "eps", "eps_prime")
+
 
 def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Method, backend and guides: the options, over the file's, over the defaults."""
-    from jflnr.methods import method_of
+    """Method, backend and guides: the options, over the file's, over the defaults.
+
+    Without a method it is None, and each frame gets its own, unless other options are of one.
+    """
+    from jflnr.methods import DEFAULT, WHOLE, method_of
 
     name = arguments.method
+    if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
+        name = DEFAULT
+    if arguments.error_map and (name not in ("flr-adaptive", WHOLE) or arguments.backend != "jax"):
+        raise ValueError(f"--error-map needs --method flr-adaptive or {WHOLE} on the jax backend")
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
     if arguments.explain and name != "auto":
         raise ValueError("--explain tells what --method auto chose, so it needs that method")
     given = {n: getattr(arguments, n) for n in ("sigma", "eps", "eps_prime", "block")}
     options = {n: value for n, value in given.items() if value is not None}
+    if name is None:
+        return {"method": None, "backend": arguments.backend, **options}
     if name != "flr" and (odd := options.keys() - {"block"}):
         option = min(odd).replace("_", "-")
         raise ValueError(f"--{option} is for --method flr; {name} finds its own")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jflnr.cli.frames import Denoised, Light, Loaded, Record, Worker, failure
+from jflnr.cli.frames import Denoised, Given, Loaded, Record, Worker, failure
 from jflnr.cli.jobs import Job, natural
 from jflnr.cli.pipeline import pipelined
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # What a history depends on.
 OPTIONS = (
-    "method", "spp", "map", "direct", "guides", "params", "sigma", "eps", "eps_prime", "block"
+    "method", "spp", "map", "guides", "params", "sigma", "eps", "eps_prime", "block"
 )  # fmt: skip
 
 UNKNOWN_MOTION = "Without a layer motion and a camera, everything is taken to stand still."
@@ -149,12 +149,12 @@ class _Running:
             return loaded, self.state
         after = self.state
 
-        def light(frame: Frame) -> Light:
+        def given(frame: Frame) -> Given:
             nonlocal after
             after, image = self._step(frame)
-            return image, None
+            return {"image": image}
 
-        denoised = self.worker.denoise(loaded, light)
+        denoised = self.worker.denoise(loaded, given)
         if isinstance(denoised, Denoised):
             self.state = after
         return denoised, self.state

@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import dataclasses
 import json
 import time
 import warnings
@@ -12,12 +11,12 @@ import numpy as np
 
 import jflnr
 from jflnr import exr, layouts
-from jflnr.cli.content import Pixels, about_of, picture_of, split, spp_of, warnings_of, with_direct
+from jflnr.cli.content import Pixels, about_of, channels_of, result_of, spp_of, warnings_of
 from jflnr.cli.jobs import Job
-from jflnr.frame import Frame, frame_of
-from jflnr.images.inputs import warn_without_ao
+from jflnr.frame import frame_of
+from jflnr.images.inputs import names_of, warn_without_ao
 from jflnr.large.scanlines import Scanlines
-from jflnr.large.source import Rows
+from jflnr.methods import WHOLE
 
 # What the picture is put together from, and what the regression always reads.
 PICTURE = {"albedo", "direct", "emission", "mask"}
@@ -31,10 +30,10 @@ def denoise_in_strips(
     _check(arguments)
     start = time.perf_counter()
     file = Scanlines(job.source, arguments.spp, dict(arguments.map))
-    first = file.part(0, 1, layouts.LAYERS)
+    first = file.part(0, 1, (*layouts.LAYERS, *layouts.PICTURE))
     whole = frame_of(first)  # but for its size
-    settings = {"method": denoiser.method, "backend": denoiser.backend, "guides": denoiser.guides}
-    about = about_of(whole, settings, spp_of(first, arguments))
+    method = denoiser.method_for(whole)
+    about = about_of(whole, denoiser, spp_of(first, arguments))
     comments = json.dumps(first.header | {"denoiser": about})
     size, window = (file.height, file.width), file.attributes.window
     others = file.attributes.others
@@ -42,13 +41,16 @@ def denoise_in_strips(
     with contextlib.ExitStack() as stack:
         caught = stack.enter_context(warnings.catch_warnings(record=True))
         warnings.simplefilter("always", UserWarning)
-        warn_without_ao(whole, denoiser.guides, denoiser.method)
-        append, names = None, tuple(about["guides"])
-        rows = _rows(file, names, arguments)
+        warn_without_ao(whole, denoiser.guides, method)
+        append, names = None, names_of(whole, denoiser.guides, method)
+        rows = file.rows(ALWAYS | set(names))
         for top, given in denoiser.strips(rows, names, tile, job.target.parent):
-            channels = _channels(file, top, given["image"], arguments, names, pixels)
-            if "error" in given:
-                channels["error.Y"] = given["error"][..., 0]
+            stop = top + given["image"].shape[0]
+            part = file.part(top, stop, PICTURE.union(names))
+            frame = frame_of(part)
+            result = result_of(frame, method, given)
+            pixels.add(frame, method.name == WHOLE, result.picture)
+            channels = channels_of(part, frame, result, arguments)
             if append is None:
                 types = dict.fromkeys(channels, np.float32)
                 output = exr.writing_rows(job.target, size, types, comments, window, others)
@@ -63,7 +65,7 @@ def denoise_in_strips(
         **about,
         "seconds": time.perf_counter() - start,
         "compile_seconds": 0,
-        "warnings": warnings_of(caught, pixels, about, whole, arguments),
+        "warnings": warnings_of(caught, pixels),
     }
 
 
@@ -73,34 +75,3 @@ def _check(arguments: argparse.Namespace) -> None:
             raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
     if arguments.channels == "all":
         raise ValueError("--channels all needs the whole frame in memory: raise --memory")
-
-
-def _rows(file: Scanlines, names: tuple[str, ...], arguments: argparse.Namespace) -> Rows:
-    """What the denoiser reads."""
-    layers = ALWAYS | set(names) | ({"direct"} if arguments.direct else set())
-    rows = file.rows(layers)
-    if not arguments.direct:
-        return rows
-
-    def read(start: int, stop: int) -> Frame:
-        both = with_direct(rows.read(start, stop), file.path)
-        return dataclasses.replace(both, direct=None)
-
-    return dataclasses.replace(rows, read=read)
-
-
-def _channels(
-    file: Scanlines,
-    top: int,
-    light: np.ndarray,
-    arguments: argparse.Namespace,
-    guides: tuple[str, ...],
-    pixels: Pixels,
-) -> dict[str, np.ndarray]:
-    """What to write of a strip, whose pixels are counted."""
-    part = file.part(top, top + light.shape[0], PICTURE.union(guides))
-    frame, lights = frame_of(part), split(light)
-    pixels.add(frame)
-    picture = picture_of(frame, lights)
-    mask = None if frame.mask is None else np.asarray(frame.mask)
-    return layouts.output_channels(part, picture, lights, mask, arguments.channels)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jflnr.frame import Array, Frame
+from jflnr.images.noisy_guides import antialiased
 
 DEFAULT = ("normal", "depth", "ao")
 NAMES = ("normal", "depth", "ao", "position", "albedo")
@@ -35,23 +36,36 @@ class Scene(NamedTuple):
     """What the whole frame says of its scene, `()` and `(3,)`, so that parts of it agree.
 
     depth: median depth of the surfaces. middle: a point among them; zeros without positions.
+    light: mean of the beauty, and averaged: whether its layers are means of several samples per
+    pixel; None without a beauty.
     """
 
-    depth: Array
-    middle: Array
+    depth: Any
+    middle: Any
+    light: Any = None
+    averaged: Any = None
 
 
 def scene_of(frame: Frame) -> Scene:
-    """The typical depth and the middle of a frame."""
+    """That of a whole frame."""
     height, width = frame.depth.shape[:2]
-    step = depth_step(height, width)
-    mask = None if frame.mask is None else frame.mask[::step, ::step]
-    depth, xp = frame.depth[::step, ::step], frame.depth.__array_namespace__()
-    middle = xp.zeros(3) if frame.position is None else frame.position[height // 2, width // 2]
-    return Scene(typical_depth(depth, mask), xp.nan_to_num(middle))
+    step = thinning(height, width)
+    middle = None if frame.position is None else frame.position[height // 2, width // 2]
+    return scene_from(frame.map(lambda layer: layer[::step, ::step]), middle)
 
 
-def depth_step(height: int, width: int) -> int:
+def scene_from(sample: Frame, middle: Array | None) -> Scene:
+    """That of a frame of which every so many pixels are given, and the position in its middle."""
+    xp: Any = sample.depth.__array_namespace__()
+    middle = xp.zeros(3) if middle is None else xp.nan_to_num(middle)
+    scene = Scene(typical_depth(sample.depth, sample.mask), middle)
+    if sample.beauty is None:
+        return scene
+    light = xp.nanmean(xp.asarray(sample.beauty, dtype=xp.float32))
+    return scene._replace(light=light, averaged=antialiased(sample.normal))
+
+
+def thinning(height: int, width: int) -> int:
     """Pixels from one to the next of a regular grid of about 16 000 pixels."""
     return max(round((height * width / 16384) ** 0.5), 1)
 

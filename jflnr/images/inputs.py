@@ -22,8 +22,7 @@ def prepare(
 
     Raises `ValueError` or `TypeError` naming the argument. Warns if the frame has no occlusion.
     """
-    own = hasattr(method, "features")
-    names = guide_layers.choose(frame, ("normal", "depth") if own else guides)
+    names = names_of(frame, guides, method)
     inputs = frame_inputs(frame, names)
     _check_sizes(inputs)
     warn_without_ao(frame, guides, method)
@@ -32,9 +31,24 @@ def prepare(
     return names, inputs
 
 
+def names_of(frame: Frame, guides: Sequence[str] | None, method: Any) -> tuple[str, ...]:
+    """The layers that a method reads besides light: its own, where they are there, or guides."""
+    own = getattr(method, "features", None)
+    if own is None:
+        return guide_layers.choose(frame, guides)
+    return tuple(name for name in own if getattr(frame, name) is not None)
+
+
+def guides_of(frame: Frame, guides: Sequence[str] | None, method: Any) -> list[str]:
+    """Those of the layers that a method reads that it takes for guides."""
+    own = getattr(method, "guides", None)
+    return [name for name in names_of(frame, guides, method) if own is None or name in own]
+
+
 def warn_without_ao(frame: Frame, guides: Sequence[str] | None, method: Any) -> None:
-    """Warn if a guide is not there that nobody has left out."""
-    if guides is None and frame.ao is None and not hasattr(method, "features"):
+    """Warn if a guide is not there that nobody has left out, and that there might be."""
+    own = hasattr(method, "features") or frame.beauty is not None
+    if guides is None and frame.ao is None and not own:
         warnings.warn(
             "The frame has no ao layer, so the guides are normal and depth only; "
             "shadows cast by indirect light may be lost.",
@@ -53,7 +67,7 @@ def _check_sizes(frame: Frame) -> None:
     layers = {name: layer for name, layer in vars(frame).items() if name != "indirect"}
     for name, layer in layers.items():
         if layer is not None or name in ("normal", "depth"):
-            checks.image(name, layer, 1 if name in ("depth", "ao", "mask") else 3)
+            checks.image(name, layer, 1 if name in ("depth", "ao", "mask", "alpha") else 3)
     checks.same_size(**layers)
     checks.image("indirect", frame.indirect)
     (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]

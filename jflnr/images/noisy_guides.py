@@ -1,11 +1,16 @@
-"""Guides with noise of their own: ambient occlusion from few rays."""
+"""Guides with noise of their own: ambient occlusion from few rays, and means of few samples."""
 
 from __future__ import annotations
 
+from typing import Any
+
+from jflnr.frame import Array
 from jflnr.lazy import jax, jnp
 
 # How far neighbours may differ, one standard deviation: normals, and depth as a share of itself.
 NORMAL, DEPTH = 0.25, 0.02
+# Normals that are a mean of several are shorter than 1; so many pixels of them are no accident.
+SHORT, SHARE = 0.98, 1e-3
 
 
 def smooth_guide(guide: jax.Array, normal: jax.Array, depth: jax.Array) -> jax.Array:
@@ -47,3 +52,14 @@ def _likeness(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
     )
     step = jnp.diff(depth, axis=axis) / (DEPTH * nearer + 1e-6)
     return jnp.nan_to_num(jnp.exp(-(turn / NORMAL**2 + step**2) / 2))
+
+
+def antialiased(normal: Array) -> Array:
+    """Whether pixels hold a mean of several normals, `()`; those of a rasteriser hold one.
+
+    A single sample anywhere in the pixel is not told from one at its centre. normal: `(H, W, 3)`,
+    0 where nothing is hit.
+    """
+    xp: Any = normal.__array_namespace__()
+    length = xp.sum(normal**2, axis=-1)
+    return xp.mean((length > 1 - SHORT) & (length < SHORT)) > SHARE

@@ -27,7 +27,9 @@ class Piece(NamedTuple):
         return slice(self.start - self.low, self.stop - self.low)
 
     def on(self, side: int) -> Piece:
-        """The same piece counted in blocks of `side`, with those at the end that are not whole."""
+        """The same piece counted in blocks of `side`, with those at the end that are not whole; 0
+        stands for pixels."""
+        side = side or 1
         first, last = self.low // side, self.start // side
         return Piece(first, -(-self.high // side), last, -(-self.stop // side))
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jflnr.frame import Frame
@@ -54,12 +53,10 @@ def rows_of(frame: Frame) -> Rows:
 
 def scene_of(rows: Rows) -> guide_layers.Scene:
     """`guides.scene_of` of the whole frame, from the few rows that it looks at."""
-    step = guide_layers.depth_step(rows.height, rows.width)
+    step = guide_layers.thinning(rows.height, rows.width)
     found = [rows.read(row, row + 1) for row in range(0, rows.height, step)]
-    depths = np.concatenate([row.depth[:, ::step] for row in found])
-    masks = [row.mask[:, ::step] for row in found if row.mask is not None]
-    depth = guide_layers.typical_depth(depths, np.concatenate(masks) if masks else None)
+    sample = jax.tree.map(lambda *lines: np.concatenate(lines)[:, ::step], *found)
     position = rows.read(rows.height // 2, rows.height // 2 + 1).position
-    if position is None:
-        return guide_layers.Scene(depth, jnp.zeros(3))
-    return guide_layers.Scene(depth, jnp.nan_to_num(position[0, rows.width // 2]))
+    return guide_layers.scene_from(
+        sample, None if position is None else position[0, rows.width // 2]
+    )

@@ -61,8 +61,8 @@ class Job:
         height, width, tile = self.rows.height, self.rows.width, self.tile
         sides = [side for _, side in (*stage.gives, *stage.totals)]
         sides += [self.kept[name].side for name in stage.reads]
-        align = math.lcm(stage.align, self.rows.factor, *sides)
-        if 1 not in sides and not stage.pixels:
+        align = math.lcm(stage.align, self.rows.factor, *filter(None, sides))
+        if 0 not in sides and not stage.pixels:
             down, across = (pieces(n, tile, stage.reach, align) for n in (height, width))
             return list(itertools.product(down, across))
         strip, reach = max(tile * tile // width, 1), stage.reach + self.method.margin
@@ -78,14 +78,15 @@ class Job:
         return _on_pixels(stage, self.method, frame, *images, parts, self.known)
 
     def _read(self, kept: Kept, rows: Piece, columns: Piece) -> Any:
-        found = kept.planes[rows.on(kept.side).outer, columns.on(kept.side).outer]
+        rows, columns = rows.on(kept.side), columns.on(kept.side)
+        found = kept.planes[rows.outer, columns.outer]
         found = found.reshape(*kept.lead, *found.shape[1:])
-        return np.moveaxis(found, 0, -1) if kept.side == 1 else found
+        return np.moveaxis(found, 0, -1) if kept.side == 0 else found
 
     def keep(self, name: str, side: int, inner: np.ndarray, rows: Piece, columns: Piece) -> None:
         """Keep `(..., h, w)` of one part for later stages."""
         if name not in self.kept:
-            size = -(-self.rows.height // side), -(-self.rows.width // side)
+            size = [-(-length // (side or 1)) for length in (self.rows.height, self.rows.width)]
             lead = inner.shape[:-2]
             planes = self.files.enter_context(Planes(self.folder, math.prod(lead), *size))
             self.kept[name] = Kept(planes, side, lead)
@@ -116,8 +117,7 @@ def _complete(job: Job, stage: Stage) -> None:
         given = job.run(stage, y, x)
         for name, side in (*stage.gives, *stage.totals):
             found = np.asarray(given[name])
-            pixels = side == 1 and name not in sums
-            found = np.moveaxis(found, -1, 0) if pixels else found
+            found = np.moveaxis(found, -1, 0) if side == 0 else found
             inner = found[..., y.on(side).kept, x.on(side).kept]
             if name in sums:
                 sums[name] = sums[name] + inner.sum((-2, -1), np.float64)
@@ -141,7 +141,7 @@ def overlapping(
             f"method {method.name} on opencl needs the whole frame in memory: raise --memory, or "
             "take the jax backend"
         )
-    align = math.lcm(rows.factor, *(side for stage in stages for _, side in stage.gives))
+    align = math.lcm(rows.factor, *(side or 1 for stage in stages for _, side in stage.gives))
     reach = sum(stage.reach for stage in stages) + method.margin
     for piece in pieces(rows.height, max(tile * tile // rows.width, 1), reach, align):
         images = method.images(rows.read(piece.low, piece.high), names, scene)

@@ -6,18 +6,20 @@ a Frame, so that nothing behind this package knows where a frame came from (docs
 
 from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
-from jflnr.layouts.channels import LAYERS, Layout, layer
+from jflnr.layouts.channels import LAYERS, PICTURE, Layout, layer
 from jflnr.layouts.output import CHOICES, output_channels
-from jflnr.layouts.source import Source, load, picture
+from jflnr.layouts.source import Source, is_picture, load, picture
 from jflnr.layouts.surface import denoised
 
 __all__ = [
     "CHOICES",
     "LAYERS",
+    "PICTURE",
     "Layout",
     "Source",
     "assemble",
     "denoised",
+    "is_picture",
     "layer",
     "load",
     "native",

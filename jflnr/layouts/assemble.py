@@ -5,14 +5,15 @@ import numpy as np
 from jflnr.camera import Camera
 from jflnr.exr import Window
 from jflnr.layouts.camera import camera_of, depth_of, position_of
-from jflnr.layouts.channels import LAYERS, NATIVE, layer
+from jflnr.layouts.channels import LAYERS, NATIVE, PICTURE, layer
 from jflnr.layouts.light import DARK, demodulate, rest
 from jflnr.layouts.source import Source
 from jflnr.layouts.surface import SKY
 
 Layers = dict[str, np.ndarray | None]
 
-GUIDES = ("albedo", "normal", "depth")  # what no frame can do without
+# What no frame can do without; where a picture has no depth, it is 1 wherever there is a normal.
+GUIDES = ("albedo", "normal", "depth")
 
 
 def assemble(source: Source) -> Layers:
@@ -22,8 +23,11 @@ def assemble(source: Source) -> Layers:
     Raises ValueError, naming the file, as `layer` does.
     """
     layout, channels = source.layout, source.channels
+    whole = "beauty" in layout.channels
     absent = [layer for layer in GUIDES if layer not in layout.channels]
     names = dict(layout.channels) | {layer: NATIVE[layer] for layer in absent}
+    if whole and layout.picture[3:]:
+        names.setdefault("alpha", layout.picture[3:])
     there = {name for name in names if any(channel in channels for channel in names[name])}
 
     def read(name: str) -> np.ndarray:
@@ -33,10 +37,10 @@ def assemble(source: Source) -> Layers:
     # Others write worldToCamera too, transposed or looking another way.
     camera = camera_of(source.attributes.others if layout.program == "pbrt" else source.header)
     needed = {layout.light, *GUIDES}
-    if camera is not None and "position" in there and "depth" not in there:
+    if "depth" not in there and (whole or (camera is not None and "position" in there)):
         needed.remove("depth")
     images: Layers = {name: read(name) for name in names if name in needed | there}
-    images = dict.fromkeys(LAYERS) | images
+    images = dict.fromkeys((*LAYERS, *PICTURE)) | images
     if source.part and layout.program == "pbrt" and (read("depth") < 0).any():
         raise ValueError(
             "depth is negative in places, which only the whole file can explain: raise --memory"
@@ -45,11 +49,15 @@ def assemble(source: Source) -> Layers:
         images["depth"] = np.abs(images["depth"])
     if camera is not None:
         images |= _derived(images, camera, source.attributes.window)
-    if layout.light != "indirect" or "beauty" in layout.channels:
-        images |= _separated(images)
+    if whole and images["depth"] is None:
+        hit = np.any(images["normal"], axis=-1, keepdims=True)
+        images["depth"] = hit.astype(np.float32)
     if layout.motion_up and images["motion"] is not None:
         images["motion"] = images["motion"] * np.array([1, -1], np.float32)
-    return {name: images[name] for name in LAYERS}
+    if layout.light != "indirect" or whole:
+        separated = _separated(images)
+        images |= (_picture(images | separated, images, source.part) if whole else {}) | separated
+    return {name: images[name] for name in (*LAYERS, *PICTURE)}
 
 
 def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
@@ -98,6 +106,30 @@ def _separated(images: Layers) -> Layers:
         "mask": mask,
         "indirect": indirect,
         "emission": emission,
+    }
+
+
+def _picture(images: Layers, given: Layers, part: bool) -> Layers:
+    """The layers of the whole picture.
+
+    Where nothing is hit, all of it is environment, unless the program tells. Blender's pass holds
+    also what a transparent film does not show, where alpha is below 1. An alpha of 1 is none.
+    given: the layers before the picture was separated. part: of the file.
+    """
+    beauty, environment, alpha = (images[name] for name in ("beauty", "environment", "alpha"))
+    assert beauty is not None
+    if environment is None:
+        environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
+    elif alpha is not None:
+        environment = np.where(alpha == 1, environment, 0)
+    if alpha is not None and not part and np.all(alpha == 1):
+        alpha = None
+    seen = images["seen_albedo"]
+    return {
+        "emitted": given["emission"],
+        "environment": environment,
+        "alpha": alpha,
+        "seen_albedo": given["albedo"] if seen is None else seen,
     }
 
 

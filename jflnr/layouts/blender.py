@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from jflnr.exr import layers_of
-from jflnr.layouts.channels import Layout, in_layer
+from jflnr.layouts.channels import Layout, Lobe, in_layer
 
 # Names since Blender 5.0, then those up to 4.x. `Noisy Image` is the picture before Blender's own
 # denoiser, which `Combined` is after.
@@ -22,31 +22,36 @@ PASSES = {
     "albedo": ("Diffuse Color", "DiffCol"),
 }
 WHOLE_PICTURE = {
-    "albedo": ("Denoising Albedo", *PASSES["albedo"]),
+    "beauty": BEAUTY,
     "emission": ("Emission", "Emit"),
+    "environment": ("Environment", "Env"),
+    "seen_albedo": ("Denoising Albedo",),
+    "seen_normal": ("Denoising Normal",),
 }
+# Of every lobe its colour, and the passes that are divided by it; volumes have no colour.
+LOBES = (
+    (("Diffuse Color", "DiffCol"), ("Diffuse Direct", "DiffDir"), ("Diffuse Indirect", "DiffInd")),
+    (("Glossy Color", "GlossCol"), ("Glossy Direct", "GlossDir"), ("Glossy Indirect", "GlossInd")),
+    (
+        ("Transmission Color", "TransCol"),
+        ("Transmission Direct", "TransDir"),
+        ("Transmission Indirect", "TransInd"),
+    ),
+    ((), ("Volume Direct", "VolumeDir"), ("Volume Indirect", "VolumeInd")),
+)
 GUIDES = {
     "normal": ("Normal", "Denoising Normal"),
     "depth": ("Depth", "Denoising Depth"),
     "position": ("Position",),
     "motion": ("Vector",),  # X, Y: to where the point was, upwards; Z, W: from where it will be
 }
-NEEDED = {"albedo": "Diffuse Color", "normal": "Normal", "depth": "Depth"}
-AO = ("Ambient Occlusion", "AO")
+NEEDED = {"albedo": "Diffuse Color", "normal": "Normal"}
 
 ADVICE = {
     "albedo": "switch on Diffuse Color under View Layer > Passes > Light, or Denoising Data",
     "normal": "switch on Normal under View Layer > Passes > Data",
-    "depth": "switch on Z under View Layer > Passes > Data",
 }
-WHOLE_NOTE = (
-    "there is no pass Diffuse Indirect with Diffuse Color, so the whole picture is divided by "
-    "{} and denoised; with both passes, only diffuse indirect light would be"
-)
-NOISY_AO = (
-    "the ambient occlusion pass is left out: Cycles traces one ray for it per sample, which makes "
-    "it as noisy as the light (with enough samples, take it by --map ao={})"
-)
+# Of no use as a guide is `Ambient Occlusion`: one ray per sample makes it as noisy as the light.
 
 
 def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
@@ -57,25 +62,31 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     view = max(views, key=lambda view: _usefulness(views[view]))
     light = _find(views[view], PASSES)
     if not {"indirect", "albedo"} <= set(light):
-        light = _find(views[view], WHOLE_PICTURE)
-    chosen = NEEDED | light | _find(views[view], GUIDES | {"beauty": BEAUTY})
+        light = _find(views[view], {"albedo": ("Denoising Albedo", *PASSES["albedo"])})
+    chosen = NEEDED | light | _find(views[view], GUIDES | WHOLE_PICTURE)
     stems = {layer: _layer(view, name) for layer, name in chosen.items()}
     names = {layer: in_layer(channels, stem) or (f"{stem}.R",) for layer, stem in stems.items()}
     names |= {"motion": names["motion"][:2]} if "motion" in names else {}
     combined = _layer(view, "Combined")
-    alpha = tuple({f"{combined}.A"} & set(channels))
-    picture = in_layer(channels, combined) + alpha
-    notes = tuple(_notes(view, views, chosen))
-    return Layout("Blender", names, picture, notes, ADVICE, motion_up=True)
+    picture = in_layer(channels, combined) + tuple({f"{combined}.A"} & set(channels))
+    lobes = tuple(_lobes(channels, view))
+    if "seen_albedo" not in names and (colours := [lobe.colour for lobe in lobes if lobe.colour]):
+        names["seen_albedo"] = sum(colours, ())
+    others = ", ".join(sorted(set(views) - {view}))
+    note = f"view layer {view} is used; the file also holds {others}"
+    return Layout("Blender", names, picture, (note,) if others else (), ADVICE, True, lobes)
 
 
-def _notes(view: str, views: Mapping[str, set[str]], chosen: Mapping[str, str]) -> Iterator[str]:
-    if "indirect" not in chosen:
-        yield WHOLE_NOTE.format(chosen["albedo"])
-    if ao := _find(views[view], {"ao": AO}):
-        yield NOISY_AO.format(_layer(view, ao["ao"]))
-    if others := sorted(set(views) - {view}):
-        yield f"view layer {view} is used; the file also holds {', '.join(others)}"
+def _lobes(channels: Mapping[str, np.ndarray], view: str) -> Iterator[Lobe]:
+    """The kinds of surfaces that have a colour and at least one pass."""
+    for layers in LOBES:
+        found = [
+            next((c for name in names if (c := in_layer(channels, _layer(view, name)))), ())
+            for names in layers
+        ]
+        colour, *passes = found
+        if (colour or not layers[0]) and any(passes):
+            yield Lobe(colour, tuple(channels for channels in passes if channels))
 
 
 def _views(channels: Iterable[str]) -> dict[str, set[str]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,15 @@ LAYERS = {
     "motion": "XY",
 }
 NATIVE = {layer: tuple(f"{layer}.{c}" for c in parts) for layer, parts in LAYERS.items()}
+# What a Frame holds besides of another program's picture, noisy as it is.
+PICTURE = {
+    "beauty": "RGB",
+    "alpha": "A",
+    "emitted": "RGB",
+    "environment": "RGB",
+    "seen_albedo": "RGB",
+    "seen_normal": "XYZ",
+}
 
 # Every half number as float32, by its bits: numpy converts slower than it looks up.
 HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
@@ -32,13 +42,21 @@ ORDER = "RXUGYVBZT"
 WORDS = {"red": "R", "green": "G", "blue": "B"}
 
 
+class Lobe(NamedTuple):
+    """What one kind of surface does with light: channels of its colour and, divided by that, of its
+    passes; () for a colour of 1."""
+
+    colour: tuple[str, ...]
+    passes: tuple[tuple[str, ...], ...]
+
+
 @dataclass(frozen=True)
 class Layout:
     """What a file's channels mean.
 
-    `channels` maps layers of a Frame to channel names, and two more: `beauty`, the whole picture,
-    and `radiance`, light to be denoised that is still multiplied by albedo (the beauty where there
-    is neither `radiance` nor `indirect`).
+    `channels` maps layers of a Frame to channel names; `emission` are those of light that surfaces
+    emit, and one more, `radiance`, is light to be denoised that is still multiplied by albedo (the
+    beauty where there is neither `radiance` nor `indirect`).
     """
 
     program: str
@@ -47,6 +65,7 @@ class Layout:
     notes: tuple[str, ...] = ()  # what a user should know about it
     advice: Mapping[str, str] = field(default_factory=dict)  # how to have a missing layer written
     motion_up: bool = False  # motion counts upwards; in a Frame it counts downwards, as rows do
+    lobes: tuple[Lobe, ...] = ()  # the light passes that the picture is the sum of
 
     @property
     def light(self) -> str:
@@ -80,7 +99,8 @@ def layer(
 ) -> np.ndarray:
     """Layer `name` of a Frame, float32 (H, W, C), from the channels `names`.
 
-    Three channels make a layer of one by their mean, one makes a layer of three by repetition.
+    Three channels make a layer of one by their mean, one makes a layer of three by repetition; an
+    albedo may be the sum of several.
     Raises ValueError, naming `source`, if channels are missing or no value is finite; `advice`
     says what to do about a missing layer. part: of the image, which may well be all sky.
     """
@@ -93,7 +113,9 @@ def layer(
     image = _float32(np.stack([channels[channel] for channel in names], axis=-1))
     if not part and not any(np.isfinite(row).any() for row in image):
         raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
-    count = len(LAYERS.get(name, "RGB"))
+    count = len((LAYERS | PICTURE).get(name, "RGB"))
+    if name == "seen_albedo" and len(names) % 3 == 0:
+        return image.reshape(*image.shape[:2], -1, 3).sum(axis=2)
     if count != 1 and len(names) not in (1, count):
         raise ValueError(f"{source}: layer {stem} has {len(names)} channels instead of {count}")
     if count == 1 < len(names):

@@ -15,14 +15,16 @@ def output_channels(
     picture: np.ndarray,
     lights: Mapping[str, np.ndarray],
     mask: np.ndarray | None = None,
+    alpha: np.ndarray | None = None,
     choice: str = "light",
 ) -> dict[str, np.ndarray]:
     """What to write, from the picture (H, W, 3) and the denoised light (H, W, 3) by layer.
 
-    choice: `picture`, as `R`, `G`, `B` with its alpha; `light`, with the layers `indirect` and
-    maybe `direct`; `all`, also with every channel of the source. Of another program's file, the
-    picture and, where `mask` (H, W, 1) is 1, the light passes are then the denoised ones: the file
-    can stand in for the source, and its passes still sum to its picture.
+    alpha: (H, W, 1), that of the source if None. choice: `picture`, as `R`, `G`, `B` with its
+    alpha; `light`, with the layer `indirect`, where that was denoised; `all`, also with every
+    channel of the source. Of another program's file, the picture and, where `mask` (H, W, 1) is 1,
+    the light passes are then the denoised ones: the file can stand in for the source, and its
+    passes still sum to its picture.
     """
     layout = source.layout
     channels: dict[str, np.ndarray] = {}
@@ -37,8 +39,10 @@ def output_channels(
     for layer, light in lights.items() if choice != "picture" else ():
         channels |= _planes(tuple(f"{layer}.{c}" for c in "RGB"), light)
     channels |= _planes(("R", "G", "B"), picture)
-    for alpha in layout.picture[3:]:
-        channels["A"] = source.channels[alpha]
+    for name in layout.picture[3:]:
+        channels["A"] = source.channels[name] if alpha is None else alpha[..., 0]
+        if choice == "all":
+            channels[name] = channels["A"]
     return {n: pixels for n, pixels in channels.items() if not n.startswith(BORROWED)}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from jflnr import checks, exr
-from jflnr.layouts.channels import LAYERS, Layout, in_layer, present
+from jflnr.layouts.channels import LAYERS, PICTURE, Layout, in_layer, present
 
 FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE)
 
@@ -26,7 +26,7 @@ def find(
     """
     found = {}
     for name, value in layers.items():
-        checks.choice("layers", name, (*LAYERS, "beauty", "radiance"))
+        checks.choice("layers", name, (*LAYERS, *PICTURE, "radiance"))
         found[name] = _find(channels, name, value, path)
     exr.check_sizes(path, channels)
     return found
@@ -63,7 +63,7 @@ def _choose(
 ) -> tuple[str, ...]:
     listed = tuple(channel.strip() for channel in value.split(","))
     found = listed if set(listed) <= set(channels) else in_layer(channels, value)
-    count = len(LAYERS.get(name, "RGB"))
+    count = len((LAYERS | PICTURE).get(name, "RGB"))
     if not found:
         what = value or "a plain channel"
         raise ValueError(f"{source}: there is no {what} for {name}; {present(channels)}")

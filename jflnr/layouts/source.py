@@ -1,7 +1,7 @@
 """A file, and what its channels mean."""
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,6 +45,11 @@ def load(
         checks.positive_integer("spp", spp)
     path, attributes, channels = Path(path), exr.read_attributes(path), exr.read_channels(path)
     return Source(path, channels, attributes, recognise(channels, spp, layers or {}, path))
+
+
+def is_picture(names: Collection[str]) -> bool:
+    """Whether channels of these names are another program's picture."""
+    return "beauty" in recognise(dict.fromkeys(names, np.zeros((1, 1)))).channels
 
 
 def recognise(

@@ -11,13 +11,14 @@ from jflnr.layouts.light import DARK
 SKY = 1e9
 
 
-def denoised(images: Mapping[str, Any]) -> tuple[int, str]:
+def denoised(images: Mapping[str, Any], whole: bool) -> tuple[int, str]:
     """The number of pixels that are denoised, and a sentence that says why if there are none.
 
-    images: the layers of a frame, (H, W, C) or None.
+    images: the layers of a frame, (H, W, C) or None. whole: whether it is denoised as a picture,
+    whose mask does not count and whose guides without a number are those of their neighbours.
     """
-    finite = lambda name: np.isfinite(images[name]).all(axis=-1)
-    depth, mask = np.asarray(images["depth"])[..., 0], images["mask"]
+    finite = lambda name: whole | np.isfinite(images[name]).all(axis=-1)
+    depth, mask = np.asarray(images["depth"])[..., 0], None if whole else images["mask"]
     seen = (depth > 0) & (depth < SKY) if mask is None else np.asarray(mask)[..., 0] > 0
     guides = seen & finite("normal") & finite("depth")
     if not seen.any() and not ((depth > 0) & (depth < SKY)).any():

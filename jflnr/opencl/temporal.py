@@ -10,7 +10,6 @@ import jax
 import numpy as np
 
 from jflnr.frame import Frame
-from jflnr.methods import DEFAULT, method_of
 from jflnr.opencl import twins
 from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.bmfr import to_device
@@ -18,6 +17,7 @@ from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
 from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
+from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 from jflnr.temporal.sequence import State, Temporal, prepared
@@ -38,7 +38,7 @@ def start(frame: Frame, context: Context | None = None) -> State:
 def step(
     state: State,
     frame: Frame,
-    method: Any = DEFAULT,
+    method: Any = None,
     *,
     guides: Sequence[str] | None = None,
     temporal: Temporal | None = None,
@@ -55,13 +55,15 @@ def step(
     Raises `ValueError` or `TypeError` naming the argument; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
-    method, names, inputs = prepared(state, frame, method_of(method, **options), guides)
+    method, names, inputs = prepared(state, frame, method, guides, options)
     temporal = temporal or Temporal()
     smooth = functools.partial(smooth_guide, context=context)
-    layers = to_layers(context, method.images(inputs, names, smooth=smooth)["guides"])
-    sample, motion = (to_device(context, layer) for layer in (frame.indirect, frame.motion))
+    given = method.images(inputs, names, smooth=smooth)
+    layers = to_layers(context, given["guides"])
+    sample, motion = (to_device(context, layer) for layer in (given["target"], frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
-    covered = to_device(context, frame.depth * 0 + 1 if frame.mask is None else frame.mask)
+    weight = frame.depth * 0 + 1 if given["weight"] is None else given["weight"][..., None]
+    covered = to_device(context, np.asarray(weight, np.float32))
 
     light, image, expected, known = reproject(context, state, surface, motion, covered)
     change, evidence = find_change(
@@ -71,11 +73,14 @@ def step(
     least = temporal.light, temporal.image
     light, weight = accumulate(context, light, change, sample, covered, least[0])
     images = {"target": light.mean, "guides": layers, "weight": weight}
-    fitted = twins.regress(method, images, context, on_device=True)
+    fitted = twins.regress(method, images, context, composed=False, on_device=True)
     image, _ = accumulate(context, image, change, fitted, covered, least[1])
     result: Any = image.mean
     context.finish(result, result)
-    return State(surface, light, image, evidence), result if on_device else result.get()
+    state = State(surface, light, image, evidence)
+    if (picture := compose(method, given | {"image": result.get()})) is not None:
+        return state, context.array(np.asarray(picture)) if on_device else np.asarray(picture)
+    return state, result if on_device else result.get()
 
 
 def reproject(
@@ -114,8 +119,8 @@ def accumulate(
     covered: Any,
     least: float,
 ) -> tuple[Average, Any]:
-    """An average that follows the change, with `image` in it; its samples where there is something
-    to denoise, else 0, `(H, W)`.
+    """An average that follows the change, with `image` in it; its samples times `covered`, which
+    says how much a pixel counts, `(H, W)`.
 
     image: `(H, W, 3)`. covered: `(H, W, 1)`. least: share of the image.
     """

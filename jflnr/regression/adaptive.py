@@ -140,7 +140,7 @@ def first_stages(side: int) -> tuple[Stage, ...]:
 
 def last_stages(evaluate: Any, side: int, reads: tuple[str, ...], method: Any) -> tuple[Stage, ...]:
     """Pass 3 by `evaluate`, and one more over its result if the brightness is to be kept."""
-    gives = (("image", 1), *([("error", 1)] if method.with_error else []))
+    gives = (("image", 0), *([("error", 0)] if method.with_error else []))
     image = Stage(evaluate, gives, reads, pixels=True, reach=2 * side)
     if not method.keep_energy:
         return (image,)

@@ -23,8 +23,6 @@ REACH, WIDTH = 2, 1.5
 # How far blurred features may differ, one standard deviation, where features vary by about 1. The
 # share of an edge that 4 samples tell is off by up to 0.25, blurred by 0.1; of two pixels, 0.14.
 ALIKE = 0.15
-# Normals that are a mean of several are shorter than 1; so many pixels of them are no accident.
-SHORT, SHARE = 0.98, 1e-3
 
 
 def filter_features(
@@ -89,13 +87,3 @@ def blur(image: jax.Array) -> jax.Array:
         before, here, after = (lax.slice_in_dim(padded, k, k + size, axis=axis) for k in range(3))
         image = lax.optimization_barrier((before + 2 * here + after) / 4)
     return image
-
-
-def antialiased(normal: jax.Array) -> jax.Array:
-    """Whether pixels hold a mean of several normals, `()`; those of a rasteriser hold one.
-
-    A single sample anywhere in the pixel is not told from one at its centre. normal: `(H, W, 3)`,
-    0 where nothing is hit.
-    """
-    length = jnp.sum(normal**2, axis=-1)
-    return jnp.mean((length > 1 - SHORT) & (length < SHORT)) > SHARE

@@ -80,7 +80,7 @@ class FLR:
         return (
             Stage(collect_moments, (("moments", side),), pixels=True),
             Stage(fit_models, (("models", side),), ("moments",), reach=reach),
-            Stage(evaluate, (("image", 1),), ("models",), pixels=True, reach=side),
+            Stage(evaluate, (("image", 0),), ("models",), pixels=True, reach=side),
         )
 
 

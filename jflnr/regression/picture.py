@@ -7,14 +7,21 @@ no noise but that of their edges, and are filtered as features are.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import functools
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax import lax
 
+from jflnr.frame import Frame
+from jflnr.images.guides import FAR, Scene, draw_near, scene_of
+from jflnr.images.inputs import same_size
+from jflnr.images.noisy_guides import antialiased
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
-from jflnr.regression.features import antialiased, filter_features
+from jflnr.regression.features import REACH, filter_features
+from jflnr.stages import Known, Parts, Stage
 
 # Side in pixels of the blocks of the first pass, with 2 samples per pixel and more; with one, 4.
 BLOCK = 2
@@ -61,10 +68,25 @@ def denoise_picture(
     method: constants of the fit. block: as of `AdaptiveFLR`. filtered: whether the layers are
     antialiased, and so have noise to be filtered; None to tell by the normals.
     """
-    clean = picture if filtered is False else filter_picture(picture)
-    if filtered is None:
-        noisy = antialiased(picture.normal)
-        clean = jax.tree.map(lambda new, old: jnp.where(noisy, new, old), clean, picture)
+    unit = jnp.nanmean(picture.beauty)
+    averaged = antialiased(picture.normal) if filtered is None else filtered
+    images = images_of(picture, clean := cleaned(picture, averaged, unit))
+    layers = images["target"], images["guides"]
+    fitted = flr_adaptive(*layers, method, block=block, weight=images["weight"])
+    return clean._replace(beauty=composed(fitted, images))
+
+
+def cleaned(picture: Picture, averaged: jax.Array | bool, unit: jax.Array) -> Picture:
+    """The picture with layers that are free of noise. averaged: whether they are means of several
+    samples, and so have any. unit: brightness of the picture, `()`."""
+    if averaged is False:
+        return picture
+    clean = filter_picture(picture, unit)
+    return jax.tree.map(lambda new, old: jnp.where(averaged, new, old), clean, picture)
+
+
+def images_of(picture: Picture, clean: Picture) -> Parts:
+    """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again."""
     surface = jnp.clip(clean.albedo, LEAST_ALBEDO, 1)
     opaque = jnp.ones(surface.shape[:2], bool)
     if clean.alpha is not None:
@@ -73,8 +95,89 @@ def denoise_picture(
     weight = firefly_weight(light_of(light)) * opaque
     layers = (clean.normal, clean.albedo, clean.seen_normal, clean.depth, clean.position)
     guides = tuple(layer for layer in layers if layer is not None)
-    fitted = flr_adaptive(light, guides, method, block=block, weight=weight)
-    return clean._replace(beauty=jnp.maximum(fitted, 0) * surface + own_light(clean))
+    images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
+    return images | {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
+
+
+def composed(light: jax.Array, images: Parts) -> jax.Array:
+    """The picture `(H, W, 3)` from light without noise."""
+    return jnp.maximum(light, 0) * images["surface"] + images["own"]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class WholePicture(AdaptiveFLR):
+    """The method: adaptive FLR of what the surfaces of a picture reflect and transmit.
+
+    filtered: as of `denoise_picture`. The rest is of `AdaptiveFLR`; the error is that of the
+    picture's brightness.
+    """
+
+    name: ClassVar[str] = "picture"
+    # A firefly is told from pixels around it, and these are divided by a filtered albedo.
+    margin: ClassVar[int] = AROUND + REACH + 1
+    guides: ClassVar[tuple[str, ...]] = (
+        *("normal", "seen_albedo", "seen_normal", "depth", "position"),
+    )
+    features: ClassVar[tuple[str, ...]] = ("beauty", "alpha", "emitted", "environment", *guides)
+
+    block: int = field(default=BLOCK, metadata={"static": True})
+    filtered: bool | None = field(default=None, metadata={"static": True})
+
+    def for_frame(self, frame: Frame, names: tuple[str, ...]) -> WholePicture:
+        if frame.beauty is None or frame.seen_albedo is None:
+            raise ValueError("method picture is for pictures of other programs: there is no beauty")
+        same_size(frame, self.name)
+        return self
+
+    def images(
+        self, frame: Frame, names: tuple[str, ...], scene: Scene | None = None, smooth: Any = None
+    ) -> Parts:
+        """The light of the surfaces, the guides, and what makes it a picture again."""
+        return _images(self.filtered, frame, scene_of(frame) if scene is None else scene)
+
+    def stages(self) -> tuple[Stage, ...]:
+        given = tuple(name for name, _ in super().stages()[-1].gives)
+        gives = tuple((name, 0) for name in given)
+        return (*super().stages(), Stage(compose, gives, given, pixels=True, composes=True))
+
+
+def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
+    """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`."""
+    image, alpha = composed(parts["image"], parts), parts["alpha"]
+    given = {"image": image if alpha is None else jnp.concatenate([image, alpha], axis=-1)}
+    if method.with_error:
+        given["error"] = parts["error"] * light_of(parts["surface"])[..., None]
+    return given
+
+
+@functools.partial(jax.jit, static_argnames="filtered")
+def _images(filtered: bool | None, frame: Frame, scene: Scene) -> Parts:
+    picture = picture_in(frame, scene)
+    assert scene.averaged is not None and scene.light is not None
+    averaged = scene.averaged if filtered is None else filtered
+    return images_of(picture, cleaned(picture, averaged, scene.light))
+
+
+def picture_in(frame: Frame, scene: Scene) -> Picture:
+    """The picture in a frame, its lengths over the median depth; what is nowhere is far."""
+    there, scale = frame.depth > 0, 1 / scene.depth
+    depth = jnp.where(frame.depth == 0, FAR + 1, draw_near(frame.depth * scale))
+    position = frame.position
+    if position is not None:
+        position = jnp.where(there, (position - scene.middle) * scale, 0)
+    layers = {
+        "beauty": frame.beauty,
+        "albedo": frame.seen_albedo,
+        "normal": frame.normal,
+        "seen_normal": frame.seen_normal,
+        "depth": depth,
+        "position": position,
+        "emission": frame.emitted,
+        "environment": frame.environment,
+        "alpha": frame.alpha,
+    }
+    return Picture(**layers)  # type: ignore[arg-type]
 
 
 def own_light(picture: Picture) -> jax.Array:
@@ -83,11 +186,11 @@ def own_light(picture: Picture) -> jax.Array:
     return sum((part for part in parts if part is not None), jnp.zeros_like(picture.beauty))
 
 
-def filter_picture(picture: Picture) -> Picture:
+def filter_picture(picture: Picture, unit: jax.Array) -> Picture:
     """Every layer but the beauty without its noise; the albedo cut to 1."""
     picture = picture._replace(albedo=jnp.clip(picture.albedo, 0, 1))
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
-    unit = jnp.nanmean(layers.pop("beauty"))
+    del layers["beauty"]
     steering = [steer(name, layer, unit) for name, layer in layers.items()]
     filtered = filter_features(steering, list(layers.values()))
     return picture._replace(**dict(zip(layers, filtered, strict=True)))

@@ -16,9 +16,9 @@ import jax.numpy as jnp
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.methods import DEFAULT, method_of
+from jflnr.methods import default_of, method_of
 from jflnr.regression.adaptive import light_of
-from jflnr.stages import regress
+from jflnr.stages import compose, regress
 from jflnr.temporal.accumulate import Average, accumulate, nothing, reproject
 from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
 from jflnr.temporal.reproject import Surface, find_taps
@@ -61,7 +61,7 @@ def start(frame: Frame) -> State:
 def step(
     state: State,
     frame: Frame,
-    method: Any = DEFAULT,
+    method: Any = None,
     *,
     guides: Sequence[str] | None = None,
     temporal: Temporal | None = None,
@@ -72,23 +72,24 @@ def step(
     state: from `start` or from the frame before. frame: with `motion`; where only the camera moves
     `camera_motion` finds it, and zeros say that nothing does. The first frame's does not count.
     method, guides, options: as of `jflnr.denoise`; a method that has stages.
-    Returns the state for the next frame, and `(H, W, C)`, demodulated indirect radiance.
+    Returns the state for the next frame, and `(H, W, C)`, what `jflnr.denoise` does.
 
     Raises `ValueError` or `TypeError` naming the argument.
     """
-    method, names, inputs = prepared(state, frame, method_of(method, **options), guides)
+    method, names, inputs = prepared(state, frame, method, guides, options)
     surface = jax.tree.map(jnp.asarray, Surface.of(frame))
     past = temporal or Temporal()
-    light, image, evidence = _step(state, inputs, frame.motion, surface, method, past, names)
+    light, image, evidence, shown = _step(state, inputs, frame.motion, surface, method, past, names)
     # The surface and the image twice would be copied if the program returned them.
-    return State(surface, light, image, evidence), image.mean
+    return State(surface, light, image, evidence), image.mean if shown is None else shown
 
 
 def prepared(
-    state: State, frame: Frame, method: Any, guides: Sequence[str] | None
+    state: State, frame: Frame, method: Any, guides: Sequence[str] | None, options: dict[str, Any]
 ) -> tuple[Any, tuple[str, ...], Frame]:
     """The method for the frame, names of the guides and the layers to denoise, if all of it and the
     state fit together."""
+    method = method_of(default_of(frame) if method is None else method, **options)
     if not hasattr(method, "stages"):
         raise ValueError(f"method {method.name} denoises frames by themselves, not over time")
     names, inputs = prepare(frame, guides, method)
@@ -117,14 +118,14 @@ def _step(
     method: Any,
     temporal: Temporal,
     names: tuple[str, ...],
-) -> tuple[Average, Average, Evidence]:
+) -> tuple[Average, Average, Evidence, jax.Array | None]:
     images = method.images(frame, names)
-    mask = images["weight"]
+    target, weight = jnp.asarray(images["target"]), images["weight"]
     taps = find_taps(motion, surface, state.surface)
     light, image = reproject(state.light, taps), reproject(state.image, taps)
-    known, covered = light.samples[..., 0] > 0, True if mask is None else mask
+    known, covered = light.samples[..., 0] > 0, True if weight is None else weight > 0
     change, evidence = find_change(
-        jnp.asarray(frame.indirect) - light.mean,
+        target - light.mean,
         light_of(image.mean),
         images["guides"],
         jnp.where(known & covered, 1.0, 0.0),
@@ -132,12 +133,13 @@ def _step(
         state.evidence,
         temporal.caution,
     )
-    light = accumulate(_changed(light, change), frame.indirect, temporal.light)
+    light = accumulate(_changed(light, change), target, temporal.light)
     # A pixel counts as much as the frames that it has been seen in.
-    weight = light.samples[..., 0] if mask is None else jnp.where(mask, light.samples[..., 0], 0)
-    fitted = regress(method, images | {"target": light.mean, "weight": weight})["image"]
+    weight = light.samples[..., 0] * (1 if weight is None else weight)
+    images |= {"target": light.mean, "weight": weight}
+    fitted = regress(method, images, composed=False)["image"]
     image = accumulate(_changed(image, change), fitted, temporal.image)
-    return light, image, evidence
+    return light, image, evidence, compose(method, images | {"image": image.mean})
 
 
 def _changed(average: Average, change: Change) -> Average:

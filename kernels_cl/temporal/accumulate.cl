@@ -9,7 +9,7 @@
 
 // Global size (ceil(pixels / WIDTH)); pixels is at least WIDTH. before, signal, image, mean: (pixels, 3).
 // before_samples, noise, surface, samples: (pixels). signal: in units. least: of a new frame. weight:
-// (pixels), the samples where surface is above 0, else 0.
+// (pixels), the samples times surface, where that is above 0, else 0.
 kernel void accumulate(
     int pixels, float least, global const float *unit, global const float *before,
     global const float *before_samples, global const float *signal, global const float *noise,
@@ -36,5 +36,6 @@ kernel void accumulate(
     const real count = good ? 1 / (kept + share * share) : n;
     write_pixels(mean + pixel * 3, mixed, 0, WIDTH - 1);
     WRITE(count, samples + pixel);
-    WRITE(READ(surface + pixel) > 0 ? count : (real)0, weight + pixel);
+    const real counts = READ(surface + pixel);
+    WRITE(counts > 0 ? count * counts : (real)0, weight + pixel);
 }

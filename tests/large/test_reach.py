@@ -37,7 +37,7 @@ def runs(method: Any, width: int) -> Iterator[Run]:
     parts = jax.tree.map(jnp.float32, images) | {"guides_map": None, "weight": None}
     known, sides = method.known(parts), dict[str, int]()
     for stage in method.stages():
-        if stage.gives[0][1] == 1:
+        if stage.gives[0][1] == 0:
             return
         if not stage.pixels:
             yield Run(stage, {name: parts[name] for name in stage.reads}, known, sides)
