@@ -14,7 +14,7 @@ import numpy as np
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.lazy import jax
+from jflnr.lazy import jax, jit
 from jflnr.methods import BACKENDS, default_of, method_of
 from jflnr.stages import Parts, regress
 
@@ -145,7 +145,7 @@ class Denoiser:
         if self.tile is not None:
             return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":
-            return _given(_whole()(method, inputs, names), frame, out)
+            return _given(_whole(method, inputs, names), frame, out)
         light = self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
         return light if out is not None else _given({"image": light}, frame, None)
 
@@ -224,12 +224,9 @@ class Denoiser:
         return functools.partial(home.start, **options), step
 
 
-@functools.cache
-def _whole() -> Callable[..., Parts]:
-    def run(method: Any, frame: Frame, names: tuple[str, ...]) -> Parts:
-        return regress(method, method.images(frame, names))
-
-    return jax.jit(run, static_argnames="names")
+@functools.partial(jit, static_argnames="names")
+def _whole(method: Any, frame: Frame, names: tuple[str, ...]) -> Parts:
+    return regress(method, method.images(frame, names))
 
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import wrapt
@@ -31,3 +33,18 @@ def pytree(dataclass: T) -> T:
         lambda module: module.tree_util.register_dataclass(dataclass), "jax"
     )
     return dataclass
+
+
+def jit(function: Callable[..., Any], **options: Any) -> Any:
+    """`jax.jit` of a function, from its first call on; `compiled()` is what that made."""
+
+    @functools.cache
+    def compiled() -> Any:
+        return jax.jit(function, **options)
+
+    @functools.wraps(function)
+    def run(*given: Any, **named: Any) -> Any:
+        return compiled()(*given, **named)
+
+    run.compiled = compiled  # type: ignore[attr-defined]
+    return run

@@ -11,10 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import jax
-import jax.numpy as jnp
-from jax import lax
-
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.moments import planes
 from jflnr.regression.strips import ROWS, fill
 

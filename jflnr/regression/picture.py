@@ -11,14 +11,11 @@ import functools
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-import jax
-import jax.numpy as jnp
-from jax import lax
-
 from jflnr.frame import Frame
 from jflnr.images.guides import FAR, Scene, draw_near, scene_of
 from jflnr.images.inputs import same_size
 from jflnr.images.noisy_guides import antialiased
+from jflnr.lazy import jax, jit, jnp, lax, pytree
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
 from jflnr.regression.features import REACH, filter_features
 from jflnr.stages import Known, Parts, Stage
@@ -69,7 +66,7 @@ def denoise_picture(
     antialiased, and so have noise to be filtered; None to tell by the normals.
     """
     unit = jnp.nanmean(picture.beauty)
-    averaged = antialiased(picture.normal) if filtered is None else filtered
+    averaged: Any = antialiased(picture.normal) if filtered is None else filtered
     images = images_of(picture, clean := cleaned(picture, averaged, unit))
     layers = images["target"], images["guides"]
     fitted = flr_adaptive(*layers, method, block=block, weight=images["weight"])
@@ -104,7 +101,7 @@ def composed(light: jax.Array, images: Parts) -> jax.Array:
     return jnp.maximum(light, 0) * images["surface"] + images["own"]
 
 
-@jax.tree_util.register_dataclass
+@pytree
 @dataclass(frozen=True)
 class WholePicture(AdaptiveFLR):
     """The method: adaptive FLR of what the surfaces of a picture reflect and transmit.
@@ -151,7 +148,7 @@ def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
     return given
 
 
-@functools.partial(jax.jit, static_argnames="filtered")
+@functools.partial(jit, static_argnames="filtered")
 def _images(filtered: bool | None, frame: Frame, scene: Scene) -> Parts:
     picture = picture_in(frame, scene)
     assert scene.averaged is not None and scene.light is not None
