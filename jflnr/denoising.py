@@ -39,9 +39,18 @@ def _own_settings(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _native(frame: Frame) -> Frame:
-    """The frame with arrays of numpy in float32 or half, in the order of bytes of this machine."""
+    """The frame with layers `(H, W, C)`, numpy's in float32 or half, in this machine's byte order.
+
+    Raises `TypeError` if it is no frame.
+    """
+    if not isinstance(frame, Frame):
+        raise TypeError(
+            "denoise takes a frame, jflnr.Frame(indirect=light, normal=normal, depth=depth), or "
+            f"what jflnr.read_frame returns; got {type(frame).__name__}"
+        )
 
     def native(layer: Array) -> Array:
+        layer = layer[..., None] if getattr(layer, "ndim", 3) == 2 else layer
         if not isinstance(layer, np.ndarray) or layer.dtype.kind != "f":
             return layer
         return layer.astype(np.float16 if layer.dtype.itemsize == 2 else np.float32, copy=False)

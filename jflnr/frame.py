@@ -23,18 +23,18 @@ HALF_MAX = float(np.finfo(np.float16).max)
 
 
 @pytree
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Frame:
-    """The layers of one frame, each (H, W, C) float32 or None; a pytree.
+    """The layers of one frame, each (H, W, C) float32 or None, of one channel also (H, W); a pytree.
 
     Light is demodulated: multiplied by `albedo` it is reflected radiance. Of another program's
     picture, `albedo`, `indirect`, `direct` and `emission` are its diffuse light and the rest.
     """
 
     indirect: Array  # (H, W, 3) noisy indirect light
-    albedo: Array  # (H, W, 3) diffuse reflectance, linear
     normal: Array  # (H, W, 3) world space, unit, turned to the camera; 0 where nothing is hit
     depth: Array  # (H, W, 1) along the view axis, scene units; 0 where nothing is hit
+    albedo: Array | None = None  # (H, W, 3) diffuse reflectance, linear
     position: Array | None = None  # (H, W, 3) world space
     ao: Array | None = None  # (H, W, 1) share of free rays
     mask: Array | None = None  # (H, W, 1) 1 where there is a surface to denoise
@@ -101,7 +101,10 @@ def composite(frame: Frame, indirect: Array) -> Array:
     """The picture `albedo * (direct + indirect) + emission`, (H, W, 3); an absent layer is 0.
 
     Where albedo is NaN or infinite it is `emission`, which for other programs is all of it.
+    Raises ValueError without albedo.
     """
+    if frame.albedo is None:
+        raise ValueError("composite needs frame.albedo, by which the light is multiplied")
     checks.image("indirect", indirect, 3)
     checks.same_size(albedo=frame.albedo, indirect=indirect)
     light = indirect if frame.direct is None else frame.direct + indirect

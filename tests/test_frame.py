@@ -38,7 +38,9 @@ def test_light_too_bright_for_half_is_kept(tmp_path: Path, frame: Frame) -> None
 
 
 def test_optional_layers_are_none(tmp_path: Path, frame: Frame) -> None:
-    least = Frame(frame.indirect, frame.albedo, frame.normal, frame.depth)
+    least = Frame(
+        indirect=frame.indirect, albedo=frame.albedo, normal=frame.normal, depth=frame.depth
+    )
     write_frame(tmp_path / "a.exr", least)
     read = read_frame(tmp_path / "a.exr")
     assert [f.name for f in dataclasses.fields(Frame) if getattr(read, f.name) is not None] == [

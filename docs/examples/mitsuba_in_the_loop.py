@@ -24,7 +24,8 @@ def render_clean(scene: mi.Scene, spp: int = 1, seed: int = 0) -> mi.TensorXf:
     mask = (depth > 0) & (albedo.max(axis=-1, keepdims=True) > 0.01)
     light = mask * (picture - lamps) / jnp.maximum(albedo, 0.01)
     rest = picture - albedo * light  # passes through as it is
-    frame = jflnr.Frame(light, albedo, normal, depth, mask=mask.astype(float), emission=rest)
+    layers = {"indirect": light, "albedo": albedo, "normal": normal, "depth": depth}
+    frame = jflnr.Frame(**layers, mask=mask.astype(float), emission=rest)
     return mi.TensorXf(jflnr.composite(frame, jflnr.denoise(frame, guides=("normal", "depth"))))
 
 

@@ -8,7 +8,7 @@ What one frame leaves to the next is a `History`, so that `jax.lax.scan` goes ov
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -119,9 +119,10 @@ def step(history: History, frame: Frame, method: BMFR = PAPER) -> tuple[History,
     )
     fitted = accumulate_fitted(taps, history, fitted, count, method.fitted_share)
     known = history.samples > 0
-    picture = smooth(frame.albedo * fitted, history.picture, known, moved, method.picture_share)
-    bright = inside & (frame.albedo > DARK)
-    image = jnp.where(bright, divide(picture, frame.albedo, DARK), fitted)
+    albedo: Any = frame.albedo
+    picture = smooth(albedo * fitted, history.picture, known, moved, method.picture_share)
+    bright = inside & (albedo > DARK)
+    image = jnp.where(bright, divide(picture, albedo, DARK), fitted)
     # A pixel without a sample so far has nothing to hand on.
     surface = Surface.of(frame)._replace(depth=jnp.where(count > 0, frame.depth, 0))
     return History(history.number + 1, surface, count, light, fitted, picture), image

@@ -44,7 +44,7 @@ def step(
     pipeline.check(frame)
     height, width = frame.indirect.shape[:2]
     output, result = to_output(context, (height, width, 3), None, on_device)
-    layers = {
+    layers: dict[str, Any] = {
         "sample": frame.indirect,
         "motion": pipeline.motion(frame),
         "normal": frame.normal,
