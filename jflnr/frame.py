@@ -25,7 +25,7 @@ HALF_MAX = float(np.finfo(np.float16).max)
 @pytree
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """The layers of one frame, each (H, W, C) float32 or None, of one channel also (H, W); a pytree.
+    """The layers of one frame, (H, W, C) float32 or None; those of one channel may be (H, W).
 
     Light is demodulated: multiplied by `albedo` it is reflected radiance. Of another program's
     picture, `albedo`, `indirect`, `direct` and `emission` are its diffuse light and the rest.
