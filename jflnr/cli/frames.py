@@ -149,8 +149,7 @@ class Worker:
             assert tile is not None
             return _record(job) | denoise_in_strips(job, self.denoiser, arguments, tile)
         method = self.denoiser.method_for(frame)
-        whole = method.name == WHOLE
-        if arguments.reference and (frame.reference is None or whole):
+        if arguments.reference and (frame.reference is None or method.name == WHOLE):
             raise ValueError(
                 f"{job.source}: --reference needs indirect light with a layer reference, and there "
                 "is none; `jflnr metrics` compares pictures"
@@ -168,7 +167,7 @@ class Worker:
         about = about_of(frame, self.denoiser, spp_of(source, arguments))
         result = result_of(frame, method, given)
         pixels = Pixels()
-        pixels.add(frame, whole, result.picture)
+        pixels.add(frame, method, result.picture)
         record = {
             "width": result.picture.shape[1],
             "height": result.picture.shape[0],
@@ -196,9 +195,11 @@ class Worker:
 
     def _given(self, frame: "Frame") -> Given:
         given = self.denoiser(frame)
-        if isinstance(given, tuple):
-            return dict(zip(("image", "error"), given, strict=True))
-        return {"image": given}
+        if not isinstance(given, tuple):
+            return {"image": given}
+        method = self.denoiser.method_for(frame)
+        names = [name for name, _ in method.stages()[-1].gives]
+        return dict(zip(names, given, strict=True))
 
     def _write(self, done: Denoised) -> Record:
         start = time.perf_counter()
