@@ -69,10 +69,8 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile"):
+    for option in ("png", "reference", "profile", "lobes"):
         if getattr(arguments, option):
             raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
-    if arguments.lobes or arguments.channels == "all":
-        raise ValueError(
-            "--lobes or --channels all needs the whole frame in memory: raise --memory"
-        )
+    if arguments.channels == "all":
+        raise ValueError("--channels all needs the whole frame in memory: raise --memory")
