@@ -51,6 +51,8 @@ class Frame:
     environment: Array | None = None  # (H, W, 3) of the beauty: what is seen behind all surfaces
     seen_albedo: Array | None = None  # (H, W, 3) of what is seen, also in mirrors and through glass
     seen_normal: Array | None = None  # (H, W, 3) likewise
+    lobes: Array | None = None  # (H, W, 6 n) direct and indirect light of n kinds of surfaces
+    lobe_colours: Array | None = None  # (H, W, 3 n) what that is to be multiplied by
 
     def map(self, change: Callable[[Array], Array]) -> Frame:
         """The frame with every layer changed."""

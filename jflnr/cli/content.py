@@ -29,7 +29,7 @@ class Result(NamedTuple):
 
     picture: `(H, W, 3)`. lights: denoised light, `(H, W, 3)`, by layer. lit: the picture without
     what shines by itself. alpha: `(H, W, 1)` if it was denoised too. error: `(H, W, 1)`, of the
-    brightness, if asked for.
+    brightness, and passes: `(H, W, C)`, light passes, if asked for.
     """
 
     picture: np.ndarray
@@ -37,6 +37,7 @@ class Result(NamedTuple):
     lit: np.ndarray
     alpha: np.ndarray | None = None
     error: np.ndarray | None = None
+    passes: np.ndarray | None = None
 
 
 def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
@@ -47,7 +48,8 @@ def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
     if method.name == WHOLE:
         shining = sum(own for own in (frame.emitted, frame.environment) if own is not None)
         picture, alpha = image[..., :3], image[..., 3:] if image.shape[-1] > 3 else None
-        return Result(picture, {}, picture - shining, alpha, given.get("error"))
+        others = given.get("error"), given.get("passes")
+        return Result(picture, {}, picture - shining, alpha, *others)
     picture, lit = (
         np.asarray(composite(some, image), np.float32)
         for some in (frame, dataclasses.replace(frame, emission=None))
@@ -60,7 +62,7 @@ def channels_of(
 ) -> dict[str, np.ndarray]:
     """What to write."""
     mask = None if frame.mask is None else np.asarray(frame.mask)
-    images = result.picture, result.lights, mask, result.alpha
+    images = result.picture, result.lights, mask, result.alpha, result.passes
     channels = layouts.output_channels(source, *images, arguments.channels)
     return channels if result.error is None else channels | {"error.Y": result.error[..., 0]}
 
@@ -90,12 +92,11 @@ class Pixels:
     why: str = ""
     light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(2))
 
-    def add(self, frame: "Frame", whole: bool, picture: np.ndarray) -> None:
-        """whole: whether the frame was denoised as a picture."""
+    def add(self, frame: "Frame", method: Any, picture: np.ndarray) -> None:
         from jflnr.frame import not_finite
-        from jflnr.regression.picture import WholePicture
 
-        names = WholePicture.features if whole else layouts.LAYERS
+        whole = method.name == WHOLE
+        names = method.features if whole else layouts.LAYERS
         counts = not_finite(frame)
         self.not_finite.update({name: n for name, n in counts.items() if name in names})
         count, why = layouts.denoised(vars(frame), whole)

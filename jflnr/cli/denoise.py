@@ -33,7 +33,7 @@ EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
   jflnr denoise render.exr -o out/ --method flr-adaptive        its diffuse indirect light only
   jflnr denoise shot/ -o clean/ --temporal --method flr-adaptive      a film, without flicker
-  jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with the clean ones
+  jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with clean light passes
   jflnr denoise room.exr -o out/ --method auto --explain    what each frame needs, and why
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with flr-adaptive and picture: add the standard error as the layer `error`",
     )
+    add("--lobes", action="store_true", help="with picture: clean every light pass too")
     add("--temporal", action="store_true", help="use the frames before: a folder is a shot")
     add(
         "--history",

@@ -79,6 +79,22 @@ class Worker:
         """What denoises; made where it is used, since it does not travel to another process."""
         return jflnr.Denoiser(**self.settings)
 
+    @functools.cached_property
+    def lobe_denoiser(self) -> "jflnr.Denoiser":
+        """The same, with light passes."""
+        method = method_of(self.settings["method"] or WHOLE)
+        return jflnr.Denoiser(**self.settings | {"method": method, "lobes": True})
+
+    def denoiser_for(self, frame: "Frame") -> "jflnr.Denoiser":
+        """The one for a frame, whose light passes are cleaned if they are asked for."""
+        whole = self.denoiser.method_for(frame).name == WHOLE
+        if self.arguments.lobes and not whole:
+            raise ValueError("--lobes is for pictures of other programs and --method picture")
+        asked = self.arguments.lobes or (
+            self.arguments.channels == "all" and frame.lobes is not None
+        )
+        return self.lobe_denoiser if whole and asked else self.denoiser
+
     def __call__(self, job: Job) -> Record:
         return self.write(self.denoise(self.read(job)))
 
@@ -149,8 +165,7 @@ class Worker:
             assert tile is not None
             return _record(job) | denoise_in_strips(job, self.denoiser, arguments, tile)
         method = self.denoiser.method_for(frame)
-        whole = method.name == WHOLE
-        if arguments.reference and (frame.reference is None or whole):
+        if arguments.reference and (frame.reference is None or method.name == WHOLE):
             raise ValueError(
                 f"{job.source}: --reference needs indirect light with a layer reference, and there "
                 "is none; `jflnr metrics` compares pictures"
@@ -168,7 +183,7 @@ class Worker:
         about = about_of(frame, self.denoiser, spp_of(source, arguments))
         result = result_of(frame, method, given)
         pixels = Pixels()
-        pixels.add(frame, whole, result.picture)
+        pixels.add(frame, method, result.picture)
         record = {
             "width": result.picture.shape[1],
             "height": result.picture.shape[0],
@@ -195,10 +210,13 @@ class Worker:
         return Denoised(job, source, frame, result, about, record)
 
     def _given(self, frame: "Frame") -> Given:
-        given = self.denoiser(frame)
-        if isinstance(given, tuple):
-            return dict(zip(("image", "error"), given, strict=True))
-        return {"image": given}
+        denoiser = self.denoiser_for(frame)
+        given = denoiser(frame)
+        if not isinstance(given, tuple):
+            return {"image": given}
+        method = denoiser.method_for(frame)
+        names = [name for name, _ in method.stages()[-1].gives]
+        return dict(zip(names, given, strict=True))
 
     def _write(self, done: Denoised) -> Record:
         start = time.perf_counter()

@@ -16,7 +16,6 @@ from jflnr.cli.jobs import Job
 from jflnr.frame import frame_of
 from jflnr.images.inputs import names_of, warn_without_ao
 from jflnr.large.scanlines import Scanlines
-from jflnr.methods import WHOLE
 
 # What the picture is put together from, and what the regression always reads.
 PICTURE = {"albedo", "direct", "emission", "mask"}
@@ -49,7 +48,7 @@ def denoise_in_strips(
             part = file.part(top, stop, PICTURE.union(names))
             frame = frame_of(part)
             result = result_of(frame, method, given)
-            pixels.add(frame, method.name == WHOLE, result.picture)
+            pixels.add(frame, method, result.picture)
             channels = channels_of(part, frame, result, arguments)
             if append is None:
                 types = dict.fromkeys(channels, np.float32)
@@ -70,7 +69,7 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile"):
+    for option in ("png", "reference", "profile", "lobes"):
         if getattr(arguments, option):
             raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
     if arguments.channels == "all":

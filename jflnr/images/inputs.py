@@ -14,6 +14,9 @@ from jflnr.frame import Array, Frame
 from jflnr.images import guides as guide_layers
 from jflnr.images.noisy_guides import smooth_guide
 
+# Of the layers that do not have three; None for any number.
+CHANNELS = {"depth": 1, "ao": 1, "mask": 1, "alpha": 1, "lobes": None, "lobe_colours": None}
+
 
 def prepare(
     frame: Frame, guides: Sequence[str] | None, method: Any
@@ -67,7 +70,7 @@ def _check_sizes(frame: Frame) -> None:
     layers = {name: layer for name, layer in vars(frame).items() if name != "indirect"}
     for name, layer in layers.items():
         if layer is not None or name in ("normal", "depth"):
-            checks.image(name, layer, 1 if name in ("depth", "ao", "mask", "alpha") else 3)
+            checks.image(name, layer, CHANNELS.get(name, 3))
     checks.same_size(**layers)
     checks.image("indirect", frame.indirect)
     (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]

@@ -57,6 +57,8 @@ def assemble(source: Source) -> Layers:
     if layout.light != "indirect" or whole:
         separated = _separated(images)
         images |= (_picture(images | separated, images, source.part) if whole else {}) | separated
+    if layout.lobes and not source.part:
+        images |= _lobes(source)
     return {name: images[name] for name in (*LAYERS, *PICTURE)}
 
 
@@ -130,6 +132,19 @@ def _picture(images: Layers, given: Layers, part: bool) -> Layers:
         "environment": environment,
         "alpha": alpha,
         "seen_albedo": given["albedo"] if seen is None else seen,
+    }
+
+
+def _lobes(source: Source) -> Layers:
+    """The light passes and their colours."""
+    lobes, channels = source.layout.lobes, source.channels
+    height, width = next(iter(channels.values())).shape
+    plane = lambda name, absent: channels.get(name, np.full((height, width), absent, np.float32))
+    passes = [plane(name, 0) for lobe in lobes for name in lobe.direct + lobe.indirect]
+    colours = [plane(name, 1) for lobe in lobes for name in lobe.colour]
+    return {
+        "lobes": np.stack(passes, axis=-1).astype(np.float32, copy=False),
+        "lobe_colours": np.stack(colours, axis=-1).astype(np.float32, copy=False),
     }
 
 

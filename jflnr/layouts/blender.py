@@ -70,7 +70,9 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     combined = _layer(view, "Combined")
     picture = in_layer(channels, combined) + tuple({f"{combined}.A"} & set(channels))
     lobes = tuple(_lobes(channels, view))
-    if "seen_albedo" not in names and (colours := [lobe.colour for lobe in lobes if lobe.colour]):
+    if "seen_albedo" not in names and (
+        colours := [lobe.colour for lobe in lobes if any(lobe.colour)]
+    ):
         names["seen_albedo"] = sum(colours, ())
     others = ", ".join(sorted(set(views) - {view}))
     note = f"view layer {view} is used; the file also holds {others}"
@@ -80,13 +82,12 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
 def _lobes(channels: Mapping[str, np.ndarray], view: str) -> Iterator[Lobe]:
     """The kinds of surfaces that have a colour and at least one pass."""
     for layers in LOBES:
-        found = [
-            next((c for name in names if (c := in_layer(channels, _layer(view, name)))), ())
+        colour, *passes = (
+            next((c for name in names if len(c := in_layer(channels, _layer(view, name))) == 3), ())
             for names in layers
-        ]
-        colour, *passes = found
+        )
         if (colour or not layers[0]) and any(passes):
-            yield Lobe(colour, tuple(channels for channels in passes if channels))
+            yield Lobe(*(tuple(found) or ("", "", "") for found in (colour, *passes)))
 
 
 def _views(channels: Iterable[str]) -> dict[str, set[str]]:

@@ -32,6 +32,8 @@ PICTURE = {
     "environment": "RGB",
     "seen_albedo": "RGB",
     "seen_normal": "XYZ",
+    "lobes": "",
+    "lobe_colours": "",
 }
 
 # Every half number as float32, by its bits: numpy converts slower than it looks up.
@@ -43,11 +45,12 @@ WORDS = {"red": "R", "green": "G", "blue": "B"}
 
 
 class Lobe(NamedTuple):
-    """What one kind of surface does with light: channels of its colour and, divided by that, of its
-    passes; () for a colour of 1."""
+    """What one kind of surface does with light: channels of its colour, and of direct and indirect
+    light divided by that. "" stands for a colour of 1, and for light that is not there."""
 
     colour: tuple[str, ...]
-    passes: tuple[tuple[str, ...], ...]
+    direct: tuple[str, ...]
+    indirect: tuple[str, ...]
 
 
 @dataclass(frozen=True)

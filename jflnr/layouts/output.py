@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from jflnr.layouts.channels import Layout
 from jflnr.layouts.override import BORROWED
 from jflnr.layouts.source import Source
 
@@ -16,11 +17,13 @@ def output_channels(
     lights: Mapping[str, np.ndarray],
     mask: np.ndarray | None = None,
     alpha: np.ndarray | None = None,
+    passes: np.ndarray | None = None,
     choice: str = "light",
 ) -> dict[str, np.ndarray]:
     """What to write, from the picture (H, W, 3) and the denoised light (H, W, 3) by layer.
 
-    alpha: (H, W, 1), that of the source if None. choice: `picture`, as `R`, `G`, `B` with its
+    alpha: (H, W, 1), that of the source if None. passes: (H, W, C), denoised, as `pass_names` names
+    them. choice: `picture`, as `R`, `G`, `B` with its
     alpha; `light`, with the layer `indirect`, where that was denoised; `all`, also with every
     channel of the source. Of another program's file, the picture and, where `mask` (H, W, 1) is 1,
     the light passes are then the denoised ones: the file can stand in for the source, and its
@@ -38,12 +41,25 @@ def output_channels(
                 channels[name] = np.where(surface, plane, source.channels[name])
     for layer, light in lights.items() if choice != "picture" else ():
         channels |= _planes(tuple(f"{layer}.{c}" for c in "RGB"), light)
+    if passes is not None and choice != "picture":
+        channels |= _planes(pass_names(layout), passes)
+        channels.pop("", None)
     channels |= _planes(("R", "G", "B"), picture)
     for name in layout.picture[3:]:
         channels["A"] = source.channels[name] if alpha is None else alpha[..., 0]
         if choice == "all":
             channels[name] = channels["A"]
     return {n: pixels for n, pixels in channels.items() if not n.startswith(BORROWED)}
+
+
+def pass_names(layout: Layout) -> tuple[str, ...]:
+    """The channels of the light passes, of their colours, and of what is emitted and seen of the
+    environment; "" for those that are not there."""
+    none = ("", "", "")
+    passes = [lobe.direct + lobe.indirect for lobe in layout.lobes]
+    colours = [lobe.colour for lobe in layout.lobes]
+    own = [layout.channels.get(layer, none) for layer in ("emission", "environment")]
+    return sum((*passes, *colours, *own), ())
 
 
 def _planes(names: tuple[str, ...], image: np.ndarray) -> dict[str, np.ndarray]:

@@ -26,7 +26,7 @@ def find(
     """
     found = {}
     for name, value in layers.items():
-        checks.choice("layers", name, (*LAYERS, *PICTURE, "radiance"))
+        checks.choice("layers", name, (*LAYERS, *filter(PICTURE.get, PICTURE), "radiance"))
         found[name] = _find(channels, name, value, path)
     exr.check_sizes(path, channels)
     return found

@@ -18,6 +18,7 @@ from jflnr.images.noisy_guides import antialiased
 from jflnr.lazy import jax, jit, jnp, lax, pytree
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
 from jflnr.regression.features import REACH, filter_features
+from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage
 
 # Side in pixels of the blocks of the first pass, with 2 samples per pixel and more; with one, 4.
@@ -28,6 +29,10 @@ LEAST_ALBEDO = 0.02
 LEAST_ALPHA = 0.1
 # A pixel so many times brighter than those around weighs as little as if it were no brighter.
 FIREFLY, AROUND = 20, 3
+# Guides of the lobes, which are fitted coarsely: normal, albedo and normal of what is seen.
+LOBE_GUIDES = 3
+# Pixels beyond any frame.
+EVERYTHING = 1 << 20
 
 
 class Picture(NamedTuple):
@@ -37,7 +42,7 @@ class Picture(NamedTuple):
     normal: unit. seen_normal: of what is seen in mirrors and through glass. depth: over its median.
     position: about a point of the scene, over the median depth. emission: seen directly.
     environment: seen directly; None on a transparent film, whose beauty does not hold it. alpha:
-    share of the pixel that is covered.
+    share of the pixel that is covered. colours: `(H, W, 3 n)`, of lobes (`lobes.split`).
     """
 
     beauty: jax.Array
@@ -49,6 +54,7 @@ class Picture(NamedTuple):
     emission: jax.Array | None = None
     environment: jax.Array | None = None
     alpha: jax.Array | None = None
+    colours: jax.Array | None = None
 
 
 def denoise_picture(
@@ -93,7 +99,11 @@ def images_of(picture: Picture, clean: Picture) -> Parts:
     layers = (clean.normal, clean.albedo, clean.seen_normal, clean.depth, clean.position)
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
-    return images | {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
+    none = jnp.zeros_like(picture.beauty)
+    own = [none if layer is None else layer for layer in (clean.emission, clean.environment)]
+    images |= {"surface": surface, "own": sum(own), "alpha": clean.alpha}
+    images |= {"emitted": own[0], "environment": own[1]}
+    return images | {"colours": (picture.colours, clean.colours)}
 
 
 def composed(light: jax.Array, images: Parts) -> jax.Array:
@@ -106,8 +116,8 @@ def composed(light: jax.Array, images: Parts) -> jax.Array:
 class WholePicture(AdaptiveFLR):
     """The method: adaptive FLR of what the surfaces of a picture reflect and transmit.
 
-    filtered: as of `denoise_picture`. The rest is of `AdaptiveFLR`; the error is that of the
-    picture's brightness.
+    filtered: as of `denoise_picture`. lobes: give the light passes too. The rest is of
+    `AdaptiveFLR`; the error is that of the picture's brightness.
     """
 
     name: ClassVar[str] = "picture"
@@ -116,15 +126,25 @@ class WholePicture(AdaptiveFLR):
     guides: ClassVar[tuple[str, ...]] = (
         *("normal", "seen_albedo", "seen_normal", "depth", "position"),
     )
-    features: ClassVar[tuple[str, ...]] = ("beauty", "alpha", "emitted", "environment", *guides)
 
     block: int = field(default=BLOCK, metadata={"static": True})
     filtered: bool | None = field(default=None, metadata={"static": True})
+    lobes: bool = field(default=False, metadata={"static": True})
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """The layers that it reads."""
+        lobes = ("lobes", "lobe_colours") if self.lobes else ()
+        return ("beauty", "alpha", "emitted", "environment", *self.guides, *lobes)
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> WholePicture:
         if frame.beauty is None or frame.seen_albedo is None:
             raise ValueError("method picture is for pictures of other programs: there is no beauty")
         same_size(frame, self.name)
+        if self.lobes and frame.lobes is None:
+            raise ValueError(
+                "there are no light passes with their colours, which lobes are made of"
+            )
         return self
 
     def images(
@@ -134,15 +154,27 @@ class WholePicture(AdaptiveFLR):
         return _images(self.filtered, frame, scene_of(frame) if scene is None else scene)
 
     def stages(self) -> tuple[Stage, ...]:
-        given = tuple(name for name, _ in super().stages()[-1].gives)
-        gives = tuple((name, 0) for name in given)
-        return (*super().stages(), Stage(compose, gives, given, pixels=True, composes=True))
+        fit = super().stages()
+        given = tuple(name for name, _ in fit[-1].gives)
+        gives = tuple((name, 0) for name in (*given, *(["passes"] if self.lobes else [])))
+        # The shares of the passes are fitted to the whole frame.
+        reach = EVERYTHING if self.lobes else 0
+        return (*fit, Stage(compose, gives, given, pixels=True, reach=reach, composes=True))
 
 
 def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
-    """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`."""
+    """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`; its error; and its light passes, as
+    in `Frame.lobes`, their colours, and what is emitted and seen of the environment, as planes of
+    `(H, W, C)`."""
     image, alpha = composed(parts["image"], parts), parts["alpha"]
     given = {"image": image if alpha is None else jnp.concatenate([image, alpha], axis=-1)}
+    if method.lobes:
+        emitted, environment = parts["emitted"], parts["environment"]
+        images = parts["lobes"], parts["colours"], parts["guides"][:LOBE_GUIDES], parts["weight"]
+        noisy = parts["target"] * parts["surface"]
+        passes, left = split(image - parts["own"], noisy, *images)
+        planes = [passes, parts["colours"][1], emitted + left, environment]
+        given["passes"] = jnp.concatenate(planes, axis=-1)
     if method.with_error:
         given["error"] = parts["error"] * light_of(parts["surface"])[..., None]
     return given
@@ -153,7 +185,8 @@ def _images(filtered: bool | None, frame: Frame, scene: Scene) -> Parts:
     picture = picture_in(frame, scene)
     assert scene.averaged is not None and scene.light is not None
     averaged = scene.averaged if filtered is None else filtered
-    return images_of(picture, cleaned(picture, averaged, scene.light))
+    images = images_of(picture, cleaned(picture, averaged, scene.light))
+    return images | {"lobes": frame.lobes}
 
 
 def picture_in(frame: Frame, scene: Scene) -> Picture:
@@ -173,6 +206,7 @@ def picture_in(frame: Frame, scene: Scene) -> Picture:
         "emission": frame.emitted,
         "environment": frame.environment,
         "alpha": frame.alpha,
+        "colours": frame.lobe_colours,
     }
     return Picture(**layers)  # type: ignore[arg-type]
 
@@ -188,7 +222,7 @@ def filter_picture(picture: Picture, unit: jax.Array) -> Picture:
     picture = picture._replace(albedo=jnp.clip(picture.albedo, 0, 1))
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
     del layers["beauty"]
-    steering = [steer(name, layer, unit) for name, layer in layers.items()]
+    steering = [steer(name, layer, unit) for name, layer in layers.items() if name != "colours"]
     filtered = filter_features(steering, list(layers.values()))
     return picture._replace(**dict(zip(layers, filtered, strict=True)))
 
