@@ -93,6 +93,11 @@ class AdaptiveFLR:
         """Pixels on a side of the finest blocks."""
         return max(self.block // 2, 1)
 
+    @property
+    def tells_error(self) -> bool:
+        """Whether the fits give the error of their models too."""
+        return self.with_error
+
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> AdaptiveFLR:
         same_size(frame, self.name)
         return self
@@ -103,7 +108,7 @@ class AdaptiveFLR:
 
     def stages(self) -> tuple[Stage, ...]:
         side = self.finest
-        models = [("models", side), ("output", 2 * side)] + [("error", side)] * self.with_error
+        models = [("models", side), ("output", 2 * side)] + [("error", side)] * self.tells_error
         return (
             *first_stages(side),
             Stage(
@@ -243,7 +248,7 @@ def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     grid = grid_of(parts["moments"], method.finest)
     levels = fit_steps(method, grid, known)
     given = merged_parts(*levels, parts["light"], grid, known)
-    if method.with_error:
+    if method.tells_error:
         given["error"] = block_error(*levels)
     return given
 
@@ -276,7 +281,7 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """Pass 3: the light of every pixel, `(H, W, C)`, and its error."""
     models = energy.scale(parts["models"], parts["output"], known["rate"])
     given = light_parts(method, models, parts, known)
-    if method.with_error:
+    if method.tells_error:
         own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
         # The floor is there for its root's derivative, and for pixels that see no light.
         error = jnp.sqrt(parts["error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
