@@ -24,7 +24,7 @@ from jflnr.images.noisy_guides import smooth_guide
 from jflnr.network import features, unet
 from jflnr.regression import adaptive
 from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.arguments import check_regression
+from jflnr.regression.arguments import channel_count, check_regression
 from jflnr.regression.moments import Guides
 from jflnr.stages import Known, Parts, Stage, regress
 
@@ -71,18 +71,17 @@ class FLNR(AdaptiveFLR):
         same_size(frame, self.name)
         if set(names) not in (set(NEEDED), set(GUIDES)):
             raise ValueError(
-                f"method {self.name} was trained with the guides {', '.join(GUIDES)}, of which only "
-                f"the last may be missing; got {', '.join(names) or 'none'}. flr and flr-adaptive "
-                "take any"
+                f"method {self.name} was trained with the guides normal, depth and, where there is "
+                f"one, ao; got {', '.join(names) or 'none'}. flr and flr-adaptive take any"
             )
-        return self.ready(frame.indirect.shape[2])
+        return self.ready(len(names) + 2, frame.indirect.shape[2])
 
-    def ready(self, channels: int) -> FLNR:
-        """With the weights that ship, if it has none. channels: of the light."""
-        if channels % COLOURS:
+    def ready(self, guides: int, channels: int) -> FLNR:
+        """With the weights that ship, if it has none. guides, channels: how many it is to take."""
+        if guides not in (4, 5) or channels % COLOURS:
             raise ValueError(
-                f"method {self.name} needs light of three channels, or groups of three; "
-                f"got {channels}"
+                f"method {self.name} needs 4 or 5 channels of guides, and light of three, or of "
+                f"groups of three; got {guides} and {channels}"
             )
         if self.params is not None:
             return self
@@ -137,7 +136,7 @@ def flnr(
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
     check_regression(target, guides, None, weight)
-    method = dataclasses.replace(method, **options).ready(target.shape[2])
+    method = dataclasses.replace(method, **options).ready(channel_count(guides), target.shape[2])
     given = regress(method, {"target": target, "guides": guides, "weight": weight})
     return (given["image"], given["error"]) if method.with_error else given["image"]
 
