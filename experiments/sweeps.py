@@ -345,7 +345,7 @@ def _scatter(parts: Parts, folder: Path) -> None:
 
 
 # Of the table, not in the chart: far below it, or on top of another line.
-HIDDEN = ("noisy", "bmfr", "flnr-tiny", "flnr-small")
+HIDDEN = ("noisy", "bmfr", "flnr-small")
 
 
 def _by_spp(parts: Parts, folder: Path) -> None:

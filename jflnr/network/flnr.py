@@ -157,9 +157,7 @@ def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
     light, read = parts["fitted"], to_read(parts, known)
     gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
     image = light * jnp.tile(gain, light.shape[2] // COLOURS)
-    unit = known["unit"]
-    both = [adaptive.light_of(parts["target"], unit), adaptive.light_of(image, unit)]
-    given = {"image": image, "sums": jnp.where(read.mask[..., 0] > 0, jnp.stack(both), 0)}
+    given = {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
     return given | ({"error": parts["noise"]} if method.with_error else {})
 
 

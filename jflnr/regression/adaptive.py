@@ -297,12 +297,16 @@ def light_parts(method: Any, models: jax.Array, parts: Parts, known: Known) -> P
     image = apply(models, guides, shift, method.finest, method.floor) * unit
     if not method.keep_energy:
         return {"image": image}
+    return {"image": image, "sums": before_and_after(image, parts, unit)}
+
+
+def before_and_after(image: jax.Array, parts: Parts, unit: jax.Array) -> jax.Array:
+    """Brightness of the pixels that count, noisy and denoised, over `unit`: `(2, H, W)`."""
     light = light_of(parts["target"])
     counts = jnp.isfinite(light)
     if parts["weight"] is not None:
         counts &= parts["weight"] > 0
-    both = jnp.stack([light / unit, light_of(image) / unit])
-    return {"image": image, "sums": jnp.where(counts, both, 0)}
+    return jnp.where(counts, jnp.stack([light / unit, light_of(image) / unit]), 0)
 
 
 def learn_kept(method: Any, known: Known, sums: Parts) -> Known:
