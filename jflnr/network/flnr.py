@@ -101,7 +101,7 @@ class FLNR(AdaptiveFLR):
             Stage(evaluate, (("fitted", 1), ("noise", 1)), given, pixels=True, reach=2 * side),
             Stage(
                 correct,
-                gives,
+                (("image", 1),),
                 ("fitted", "noise"),
                 pixels=True,
                 reach=unet.reach_of(scales),
@@ -109,7 +109,7 @@ class FLNR(AdaptiveFLR):
                 totals=(("sums", 1),),
                 learn=learn_share,
             ),
-            Stage(adaptive.keep_energy, gives, tuple(name for name, _ in gives)),
+            Stage(restore, gives, ("image", "noise")),
         )
 
 
@@ -157,8 +157,7 @@ def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
     light, read = parts["fitted"], to_read(parts, known)
     gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
     image = light * jnp.tile(gain, light.shape[2] // COLOURS)
-    given = {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
-    return given | ({"error": parts["noise"]} if method.with_error else {})
+    return {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
 
 
 def learn_share(method: FLNR, known: Known, sums: Parts) -> Known:
@@ -167,6 +166,12 @@ def learn_share(method: FLNR, known: Known, sums: Parts) -> Known:
     slack = 0 if method.keep_energy else method.slack
     wanted = jnp.clip(after, (1 - slack) * before, (1 + slack) * before)
     return {"share": jnp.where(after > 0, wanted / jnp.where(after > 0, after, 1), 1)}
+
+
+def restore(method: FLNR, parts: Parts, known: Known) -> Parts:
+    """The result with the brightness of the input, and the error of what was corrected."""
+    given = {"image": parts["image"] * known["share"]}
+    return given | ({"error": parts["noise"]} if method.with_error else {})
 
 
 def to_read(parts: Parts, known: Known) -> features.Read:
