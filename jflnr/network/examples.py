@@ -132,6 +132,7 @@ def _record(
     of_all |= {"albedo": albedo, "target": np.clip(target * scale, 0, BRIGHTEST)}
     groups = np.searchsorted(list(SHARES), fields["spp"], side="right")
     own = [np.mean([e for e, g in zip(errors, groups, strict=True) if g == k]) for k in groups]
+    found: dict[str, np.ndarray]
     found = {name: np.asarray(value, np.float16) for name, value in of_all.items()}
     found |= {name: np.asarray(fields[name], np.float16) for name in OF_NOISE}
     found |= {"spp": np.array(fields["spp"]), "occluded": np.array(fields["occluded"])}
@@ -143,14 +144,14 @@ def _record(
     return record
 
 
-def before_network(frame: Frame, occluded: bool = True) -> tuple[Read, np.float32]:
+def before_network(frame: Frame, occluded: bool = True) -> tuple[Read, float]:
     """What the network reads of a frame, and the unit of its light.
 
     occluded: with the occlusion that the frame may have.
     """
     names = GUIDES if occluded and frame.ao is not None else NEEDED
     read, unit = jax.tree.map(np.asarray, _before(frame_inputs(frame, names), names))
-    return read, unit
+    return read, float(unit)
 
 
 @jax.jit(static_argnames="names")

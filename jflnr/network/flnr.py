@@ -31,6 +31,8 @@ from jflnr.stages import Known, Parts, Stage, regress
 # Guides that the network was trained with: normal (3), depth and, where a frame has it, occlusion.
 NEEDED, GUIDES = ("normal", "depth"), ("normal", "depth", "ao")
 COLOURS = 3
+# Least and largest of the guides' channels that the network sees.
+LIMITS = ((-1, -1, -1, 0, 0), (1, 1, 1, 100, 1))
 # Logarithm of the largest factor on the light.
 LARGEST = 1.5
 
@@ -188,7 +190,8 @@ def to_read(parts: Parts, known: Known) -> features.Read:
 
     groups = (*target.shape[:2], target.shape[2] // COLOURS, COLOURS)
     light, noisy = (x.reshape(groups).sum(2) for x in (parts["fitted"], target))
-    guides = jnp.where(usable, guides, 0)
+    lowest, highest = jnp.asarray(LIMITS, guides.dtype)[:, : guides.shape[2]]
+    guides = jnp.where(usable, jnp.clip(guides, lowest, highest), 0)
     ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(usable, 1.0, 0.0)
     mask = usable.astype(light.dtype)
     images = shown(light), shown(noisy), shown(parts["noise"])

@@ -22,7 +22,7 @@ VECTORS, TOGETHER = 3, 4
 BEYOND = 64
 # Of kernels_cl/network/read.h, and which of what is read of a pixel is its mask.
 MEANS, MASK = 8, 13
-DARK = {"DARK": f"{features.DARK}f"}
+DARK: dict[str, Any] = {"DARK": f"{features.DARK}f"}
 
 
 class Maps(NamedTuple):
@@ -72,7 +72,7 @@ def correct(
     h, w = (-(-size >> scales) << scales - 1 for size in (height, width))
     x = new_maps(context, 4 * features.PIXEL + features.POOLED, h, w)
     means = new_maps(context, MEANS, h, w)
-    defines = pixel_defines(target, guides, weight, 1) | DARK
+    defines: dict[str, Any] = pixel_defines(target, guides, weight, 1) | DARK
     defines |= {"WIDTH": context.width(), "BRIGHTEST": f"{features.BRIGHTEST}f"}
     arguments = (
         width, height, h, w, x.pitch, target, *guide_arguments(guides), weight, light, error, mean,
@@ -85,11 +85,11 @@ def correct(
         "WIDTH": context.width(), "LARGEST": f"{LARGEST}f", "COUNTS": x.channels,
         "PIXEL": features.PIXEL, "MASK": MASK,
     }  # fmt: skip
-    arguments = width, height, h, w, x.pitch, said.values, x.values, light, output
-    context.run("correct", "network/correct.cl", defines, size, arguments)
+    of_light = width, height, h, w, x.pitch, said.values, x.values, light, output
+    context.run("correct", "network/correct.cl", defines, size, of_light)
 
 
-def apply(context: Context, arrays: dict[str, np.ndarray], x: Maps, means: Maps) -> Maps:
+def apply(context: Context, arrays: dict[str, Any], x: Maps, means: Maps) -> Maps:
     """What the network says. x: what it reads at half of the resolution. means: there."""
     scales = unet.scales_of(arrays)
     x = convolve(context, arrays, "stem", x)

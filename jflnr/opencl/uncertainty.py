@@ -36,9 +36,9 @@ def standard_error(
     assert before is not None
     (h, w, pitch), (rate, brightness) = before.sizes, scale
     error = run.context.empty((1, 1, h, pitch))
-    arguments = (
+    of_grid = (
         h, pitch, brightness.shape[1], VARIANCE, LEFT_OUT, DETAIL, run.mean, rate, brightness,
         own.planes, before.planes, error,
     )  # fmt: skip
-    run.launch("standard_error", "error.cl", before, arguments, COUNT=0)
+    run.launch("standard_error", "error.cl", before, of_grid, COUNT=0)
     apply(run.context, error, (), run.shift, step, (h, w, pitch), output)

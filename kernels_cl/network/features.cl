@@ -42,7 +42,10 @@ INLINE void of_pixels(
         for (int q = 0; q < Q; ++q) known[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, last);
         counts = usable(weight, pixel, last, known, all) > 0;
 #pragma unroll
-        for (int q = 0; q < Q; ++q) guides[q] = counts ? known[q] : (real)0;
+        for (int q = 0; q < Q; ++q) {
+            const real cut = CLAMP(known[q], q < 3 ? -1 : 0, q == 3 ? 100 : 1);
+            guides[q] = counts ? cut : (real)0;
+        }
         wrong = image_lanes(error + pixel, 1, 0, last);
     }
 #if Q == 4
