@@ -10,6 +10,7 @@ NAMES = (
     "methods",
     "settings",
     "spp",
+    "network",
     "block",
     "upsample",
     "guides",

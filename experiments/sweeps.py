@@ -139,6 +139,7 @@ def flr_of_sigma(sigma: float) -> Method:
 # Independent streams of the files that together make so many samples per pixel.
 STREAMS = {1: (1,), 4: (4,), 5: (1, 4), 16: (16,), 20: (4, 16)}
 COUNTS = (1, 2, 4, 8, 16, 32, 64)
+CORRECTED = ("flr-adaptive", "flnr-small", "flnr")
 PEERS = ("guided filter, tuned", "SVGF, spatial, tuned", "BMFR, one frame, tuned", "OIDN, tuned")
 
 
@@ -179,6 +180,16 @@ def nfor_of(frame: Frame, *, streams: tuple[int, int]) -> Array:
     light = np.asarray(frame.indirect)
     halves = ((light[..., :3], streams[0]), (light[..., 3:], streams[1]))
     return nfor.denoise(frame, halves=halves, **nfor.PAPER)
+
+
+def _network() -> list[Case]:
+    some = [method(name, method=name, backend="opencl") for name in CORRECTED]
+    some += [m for m in peers() if m.name == "OIDN, tuned"]
+    return [
+        Case({"method": m.name, "spp": spp}, m, functools.partial(_of_streams, streams=(spp,)))
+        for spp in (1, 4, 16)
+        for m in some
+    ]
 
 
 def _rendered(path: Path, spp: int) -> Frame:
@@ -345,7 +356,7 @@ def _scatter(parts: Parts, folder: Path) -> None:
 
 
 # Of the table, not in the chart: far below it, or on top of another line.
-HIDDEN = ("noisy", "bmfr", "flnr-tiny", "flnr-small")
+HIDDEN = ("noisy", "bmfr", "flnr-small")
 
 
 def _by_spp(parts: Parts, folder: Path) -> None:
@@ -381,6 +392,14 @@ _SWEEPS = (
         one_view_each=True,
         measure=everything,
         charts=_by_spp,
+    ),
+    Sweep(
+        "network",
+        "What does the network bring over adaptive FLR, at 1, 4 and 16 samples per pixel?",
+        3,
+        _network,
+        ("val", "test"),
+        measure=everything,
     ),
     Sweep(
         "block",

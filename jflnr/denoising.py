@@ -74,20 +74,20 @@ def denoise(
     it may also be smaller than the other layers by a whole factor; the result then has their size.
     method: an object such as `FLR(sigma=12)`, or a name: `picture`, the whole picture
     (docs/layouts.md), `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`,
-    the same steered by a network, `flnr-small` or `flnr-tiny`, by a smaller one (docs/flnr.md),
-    `bmfr`, as in the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that
-    is good enough for the frame (docs/select.md). If None, `picture` where the frame has a
-    `beauty`, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
-    on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
+    the same corrected by a network, `flnr-small`, by a smaller one (docs/flnr.md), `bmfr`, as in
+    the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that is good enough
+    for the frame (docs/select.md). If None, `picture` where the frame has a `beauty`, else `flr`.
+    options: fields of the method to replace, such as `block=4`, the pixels on a side that share one
+    model, or `keep_energy=True`, to keep the mean radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
     tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
     (docs/large.md); on all of them if None.
     Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
     Returns `(H, W, C)` float32, demodulated indirect radiance, of `picture` the picture itself, RGB
-    or, where the frame has an `alpha`, RGBA; with the option `with_error=True` of `flr-adaptive`
-    and `picture` also its standard error, `(H, W, 1)`: nine pixels of ten are within 1.645 of the
-    truth. They are arrays of numpy if the frame's are, else of JAX.
+    or, where the frame has an `alpha`, RGBA; with the option `with_error=True` of `flr-adaptive`,
+    `flnr` and `picture` also its standard error, `(H, W, 1)`: nine pixels of ten are within 1.645
+    of the truth. They are arrays of numpy if the frame's are, else of JAX.
 
     Raises `ValueError` or `TypeError` naming the argument, also if no pixel can be used. Warns if
     the frame has no ambient occlusion.

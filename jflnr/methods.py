@@ -29,7 +29,6 @@ HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "flr": ("jflnr.regression.flr", "FLR", {}),
     "flr-adaptive": ("jflnr.regression.adaptive", "AdaptiveFLR", {}),
     "picture": ("jflnr.regression.picture", "WholePicture", {}),
-    "flnr-tiny": ("jflnr.network.flnr", "FLNR", {"size": "tiny"}),
     "flnr-small": ("jflnr.network.flnr", "FLNR", {"size": "small"}),
     "flnr": ("jflnr.network.flnr", "FLNR", {}),
     "bmfr": ("jflnr.bmfr.pipeline", "BMFR", {}),

@@ -1,5 +1,5 @@
-// Adaptive FLR with keep_energy: the result scaled so that its brightness sums to the input's over the
-// pixels that count, those whose input is finite and whose weight is above 0.
+// The result scaled so that its brightness sums to the input's within `slack`, over the pixels that
+// count, those whose input is finite and whose weight is above 0.
 //
 // Defines: those of the headers, with Q = 0: what guide_lanes reads here is the image.
 
@@ -34,7 +34,8 @@ kernel void energy_rows(
 }
 
 // ratio: what the image is to be multiplied by. One work-item.
-kernel void energy_ratio(int height, global const float *partial, global float *ratio)
+kernel void energy_ratio(
+    int height, float slack, global const float *partial, global float *ratio)
 {
     if (get_global_id(0) > 0) return;
     float before = 0, after = 0;
@@ -42,7 +43,8 @@ kernel void energy_ratio(int height, global const float *partial, global float *
         before += partial[2 * row];
         after += partial[2 * row + 1];
     }
-    ratio[0] = after > 0 ? before / after : 1;
+    const float wanted = CLAMP(after, (1 - slack) * before, (1 + slack) * before);
+    ratio[0] = after > 0 ? wanted / after : 1;
 }
 
 // count: numbers in the image. Global size (count / WIDTH, rounded up).

@@ -4,8 +4,7 @@
 //   exp(-d^2 / (2 sigma^2)) exp(-|f_i - f_j|^2 / 2),   d = their distance in blocks
 //
 // Defines: REACH, blocks on each side that the window extends over, at most GROUP; FEATURES, the number
-// of planes of f; FEATURE_PLANES, how many lie together with these first; WIDER, 1 if after these comes
-// a factor on the sigma of each block.
+// of planes of f; FEATURE_PLANES, how many lie together with these first.
 
 #define TAPS (2 * REACH + 1)
 #define ADD_WEIGHTED(t, v) sum += weights[t] * (v);
@@ -35,15 +34,10 @@
     }
 #endif
 
-// From squared distances to weights. sigma: in blocks. features: plane 0 at the block.
-INLINE void weigh(real *weights, float sigma, global const float *features)
+// From squared distances to weights. sigma: in blocks.
+INLINE void weigh(real *weights, float sigma)
 {
-#if WIDER
-    const real width = MAX(sigma * READ(features + FEATURES * GROUP), 1e-2f);
-#else
-    const float width = MAX(sigma, 1e-2f);
-#endif
-    const real narrow = 1 / (width * width);
+    const float width = MAX(sigma, 1e-2f), narrow = 1 / (width * width);
 #pragma unroll
     for (int t = 0; t < TAPS; ++t)
         weights[t] = exp_below_0(-0.5f * (weights[t] + (t - REACH) * (t - REACH) * narrow));
@@ -63,7 +57,7 @@ INLINE void row_weights(
 #define ADD_SQUARE(t, v) weights[t] += ((v) - here) * ((v) - here);
         FOR_TAPS(p, FEATURE_PLANES, ADD_SQUARE)
     }
-    weigh(weights, sigma, features);
+    weigh(weights, sigma);
     if (x < REACH || x + WIDTH + REACH > pitch)
 #pragma unroll
         for (int t = 0; t < TAPS; ++t) weights[t] *= LANES(real, IN_ROW);
@@ -90,7 +84,7 @@ INLINE void column_weights(
             weights[t] += apart * apart;
         }
     }
-    weigh(weights, sigma, features);
+    weigh(weights, sigma);
 #pragma unroll
     for (int t = 0; t < TAPS; ++t)
         if (rows[t] != t - REACH) weights[t] = 0;

@@ -6,6 +6,7 @@ render SCENE -o FOLDER --motion MOTION --frames N      a sequence
 render again FRAME.exr -o FILE.exr       a finished frame once more, as its header says
 render families [-o docs/scenes.png]    one scene of each family on a contact sheet
 render data [--split train|val|test] [--frames N]       the data set; resumes
+render targets [--folder cache/frames]  what training frames are trained on; resumes
 render shots [--folder cache/sequences]         those of the experiment `sequences`; resumes
 render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
 render efficiency [SCENE...]            samples a second, variance x seconds of each sampling
@@ -20,7 +21,7 @@ from pathlib import Path
 
 from experiments.rendering import backend
 
-VERBS = ("again", "families", "data", "shots", "statistics", "efficiency")
+VERBS = ("again", "families", "data", "targets", "shots", "statistics", "efficiency")
 MOTIONS = ("static", "camera", "light", "switch", "object")
 
 
@@ -53,6 +54,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
         "again": _again,
         "families": _families,
         "data": _data,
+        "targets": _targets,
         "shots": _shots,
         "statistics": _statistics,
         "efficiency": _efficiency,
@@ -116,6 +118,10 @@ def _data(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="on a Dask cluster, tcp://HOST:8786; without ADDRESS on this machine's cores",
     )
+
+
+def _targets(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
 
 
 def _statistics(parser: argparse.ArgumentParser) -> None:

@@ -21,7 +21,7 @@ from jflnr.images import guides as guide_layers
 from jflnr.images.inputs import plain_images, prepare, robust_images, same_size
 from jflnr.images.noisy_guides import smooth_guide
 from jflnr.methods import method_of
-from jflnr.network.features import GUIDES
+from jflnr.network.flnr import GUIDES, NEEDED
 from jflnr.regression.adaptive import light_of
 from jflnr.regression.apply import apply
 from jflnr.regression.energy import rescale
@@ -149,7 +149,7 @@ def _planned(
     first = plans.first(bool(is_simple(frame)), limits, pixels)
     fitted = _fitted(frame, names, first)
     look = plans.look_at(fitted.models)
-    network = sorted(names) == sorted(GUIDES) and frame.indirect.shape[-1] == 3
+    network = set(names) in (set(NEEDED), set(GUIDES)) and frame.indirect.shape[-1] % 3 == 0
     order = np.asarray(fitted.models.order)
     return plans.plan(first, look, names, order, pixels, limits, network), fitted
 

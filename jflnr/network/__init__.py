@@ -1,1 +1,1 @@
-"""FLNR: adaptive FLR steered by a small network (section 3.3 of the paper)."""
+"""FLNR: adaptive FLR corrected by a small network (section 3.3 of the paper)."""

@@ -1,80 +1,51 @@
-"""Adam (Kingma and Ba 2015) as a stochastic solver of jaxopt, with an average of the weights."""
+"""Adam (Kingma and Ba 2015), with an average of the weights."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxopt._src import base
-from jaxopt.tree_util import tree_l2_norm
+
+BETA1, BETA2 = 0.9, 0.99
+# Longest gradient; share of each weight lost per step, times the step's size (Loshchilov and Hutter
+# 2019); steps that the average looks back over, at most.
+CLIP, DECAY, HORIZON = 1.0, 1e-4, 300.0
 
 
-class AdamState(NamedTuple):
-    """iter_num: steps done. value: loss before the last one. error: norm of its gradient.
+class Adam(NamedTuple):
+    """params: the weights. mean, square: running moments of the gradient. average: running mean of
+    the weights, which is what to use. step: how many were done."""
 
-    mean, square: running moments of the gradient. average: running mean of the parameters,
-    which is what to use.
-    """
-
-    iter_num: jax.Array
-    value: jax.Array
-    error: jax.Array
+    params: Any
     mean: Any
     square: Any
     average: Any
+    step: jax.Array
 
 
-@dataclass(eq=False)
-class Adam(base.StochasticSolver):
-    """Adaptive step sizes; decay of the weights apart from them (Loshchilov and Hutter 2019).
+def start(params: Any) -> Adam:
+    """The state before the first step."""
+    params = jax.tree.map(jnp.asarray, params)
+    zeros = jax.tree.map(jnp.zeros_like, params)
+    return Adam(params, zeros, zeros, params, jnp.asarray(0))
 
-    fun: `fun(params, data) -> loss`. stepsize: from the step's number. clip: longest gradient.
-    decay: share of each weight lost per step, times the step size. horizon: steps that the
-    average looks back over, at most.
-    """
 
-    fun: Callable[..., jax.Array]
-    stepsize: Callable[[jax.Array], jax.Array]
-    beta1: float = 0.9
-    beta2: float = 0.99
-    clip: float = 1.0
-    decay: float = 0.0
-    horizon: float = 300.0
-    maxiter: int = 1000
-    tol: float = 0.0
-    jit: bool = True
-    implicit_diff: bool = False
-    implicit_diff_solve: Callable | None = None
-    verbose: bool = False
-    unroll: bool = False
+def update(state: Adam, gradient: Any, rate: jax.Array) -> Adam:
+    """One step of size `rate`."""
+    norm = jnp.sqrt(sum(jnp.sum(g**2) for g in jax.tree.leaves(gradient)))
+    # A batch whose gradient overflowed is left out.
+    factor = jnp.where(jnp.isfinite(norm), jnp.minimum(1, CLIP / (norm + 1e-12)), 0)
+    gradient = jax.tree.map(lambda g: jnp.nan_to_num(g * factor), gradient)
+    t = state.step + 1
+    mean = jax.tree.map(lambda m, g: BETA1 * m + (1 - BETA1) * g, state.mean, gradient)
+    square = jax.tree.map(lambda s, g: BETA2 * s + (1 - BETA2) * g**2, state.square, gradient)
 
-    def init_state(self, init_params: Any, *args: Any, **kwargs: Any) -> AdamState:
-        """The state before the first step."""
-        zeros = jax.tree.map(jnp.zeros_like, init_params)
-        infinite = jnp.asarray(jnp.inf, jnp.float32)
-        return AdamState(jnp.asarray(0), infinite, infinite, zeros, zeros, init_params)
+    def move(p: jax.Array, m: jax.Array, s: jax.Array) -> jax.Array:
+        direction = m / (1 - BETA1**t) / (jnp.sqrt(s / (1 - BETA2**t)) + 1e-8)
+        return (p - rate * (direction + DECAY * p)).astype(p.dtype)
 
-    def update(self, params: Any, state: AdamState, *args: Any, **kwargs: Any) -> base.OptStep:
-        """One step on one batch: `update(params, state, data=batch)`."""
-        value, gradient = jax.value_and_grad(self.fun)(params, *args, **kwargs)
-        norm = tree_l2_norm(gradient)
-        # A batch whose gradient overflowed is left out.
-        factor = jnp.where(jnp.isfinite(norm), jnp.minimum(1, self.clip / (norm + 1e-12)), 0)
-        gradient = jax.tree.map(lambda g: jnp.nan_to_num(g * factor), gradient)
-        t = state.iter_num + 1
-        b1, b2 = self.beta1, self.beta2
-        mean = jax.tree.map(lambda m, g: b1 * m + (1 - b1) * g, state.mean, gradient)
-        square = jax.tree.map(lambda s, g: b2 * s + (1 - b2) * g**2, state.square, gradient)
-        step = self.stepsize(state.iter_num)
-
-        def move(p: jax.Array, m: jax.Array, s: jax.Array) -> jax.Array:
-            direction = m / (1 - b1**t) / (jnp.sqrt(s / (1 - b2**t)) + 1e-8)
-            return (p - step * (direction + self.decay * p)).astype(p.dtype)
-
-        params = jax.tree.map(move, params, mean, square)
-        rate = 1 / jnp.minimum(t + 1, self.horizon)
-        average = jax.tree.map(lambda a, p: a + rate * (p - a), state.average, params)
-        return base.OptStep(params, AdamState(t, value, norm, mean, square, average))
+    params = jax.tree.map(move, state.params, mean, square)
+    share = 1 / jnp.minimum(t + 1, HORIZON)
+    average = jax.tree.map(lambda a, p: a + share * (p - a), state.average, params)
+    return Adam(params, mean, square, average, t)

@@ -1,4 +1,4 @@
-"""Training examples: crops of frames under ever new noise, with all that precedes the network."""
+"""Training examples: crops of frames under ever other noise, with all that precedes the network."""
 
 from __future__ import annotations
 
@@ -10,169 +10,192 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jflnr import exr
+from jflnr.files import replacing
 from jflnr.frame import Frame, read_frame
 from jflnr.images.inputs import frame_inputs
-from jflnr.metrics import MEAN_BRIGHTNESS
-from jflnr.network import features
-from jflnr.network.augment import augment
-from jflnr.network.flnr import DEFAULT
-from jflnr.stages import Known, Parts, run
+from jflnr.metrics import display, exposure
+from jflnr.network import flnr
+from jflnr.network.features import BRIGHTEST, Read
+from jflnr.network.flnr import FLNR, GUIDES, NEEDED
+from jflnr.stages import run
 
-# Sides of a crop: whole blocks on the coarsest grid, so that flipping a crop flips all grids.
-HEIGHT, WIDTH = 160, 320
-# Samples per pixel that are trained on, and how often.
-SHARES = {1: 0.85, 2: 0.05, 4: 0.05, 16: 0.05}
-NOISY = re.compile(r"indirect_(\d+)(_[a-z])?\.R")
+CROP = 128
+# How often crops of fewer than so many samples per pixel are drawn.
+SHARES = {4: 0.5, 16: 0.25, 1 << 30: 0.25}
+# Share of the fits that have occlusion among their guides: files of other programs have none.
+OCCLUDED = 0.8
+# Squared error as displayed below which a picture is as good as its target.
+FLOOR = 3e-4
 # A crop that shows little but sky teaches little.
-LEAST_SURFACE = 0.2
-
-
-class Crop(NamedTuple):
-    """A part of a frame, and its light under several realisations of the noise.
-
-    light: by samples per pixel, `(N, H, W, 3)`.
-    """
-
-    frame: Frame
-    light: dict[int, np.ndarray]
+LEAST_SURFACE, TRIES = 0.3, 5
+# Change it when prepared frames become others.
+VERSION = 1
+NOISY = re.compile(r"indirect_(\d+)(_[a-z])?\.R")
+OF_NOISE = ("light", "noisy", "error")
 
 
 class Example(NamedTuple):
     """One crop under one realisation of the noise.
 
-    parts, known: what precedes the network. albedo: `(H, W, 3)`. target: `(H, W, 3)`, what the
-    reflected light should be, as exposed on the screen. exposure: the factor for that.
+    albedo: `(H, W, 3)`. target: `(H, W, 3)`, what the light should be, as exposed on the screen.
+    exposure: of what is read. error: of the frame before the network, as displayed.
     """
 
-    parts: Parts
-    known: Known
+    read: Read
     albedo: Any
     target: Any
     exposure: Any
+    error: Any
 
 
-def read(paths: Sequence[Path], seed: int) -> Iterator[list[Crop]]:
-    """The crops of every frame, file by file.
+def prepared(path: Path, folder: Path) -> np.ndarray:
+    """A frame under about 20 realisations of its noise, each denoised by adaptive FLR.
 
-    The target is the layer `reference`. A frame without one must have two noisy layers of as many
-    samples: each is then the target of the others.
-    Raises `ValueError` for a frame that is too small or that lacks a layer.
+    One record in half precision, its fields those of `Example`; made once and kept in `folder`.
+    The target is the layer `target`, or else `reference`.
+    Raises `ValueError` for a frame that lacks a layer or is too small.
     """
-    for path in paths:
-        random = np.random.default_rng([seed, *path.name.encode()])
-        frame, light = _layers(path)
-        height, width = frame.depth.shape[:2]
-        places = _places(height, width, random)
-        found = (
-            Crop(_cut(frame, at), {spp: a[:, *at] for spp, a in light.items()}) for at in places
-        )
-        yield [crop for crop in found if _teaches(crop)]
+    size, time = path.stat().st_size, path.stat().st_mtime_ns
+    key = hashlib.sha256(f"{VERSION} {path.resolve()} {size} {time}".encode())
+    kept = folder / f"{path.stem}-{key.hexdigest()[:12]}.npy"
+    if not kept.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        with replacing(kept) as beside, beside.open("wb") as file:
+            np.save(file, _record(*layers(path), np.random.default_rng([*path.name.encode()])))
+    return np.load(kept, mmap_mode="r")
 
 
-def _layers(path: Path) -> tuple[Frame, dict[int, np.ndarray]]:
-    """The frame, and its noisy layers by samples per pixel, `(N, H, W, 3)`."""
+def layers(path: Path) -> tuple[Frame, dict[int, list[np.ndarray]]]:
+    """The frame, its target as `reference`, and its noisy layers by samples per pixel."""
     channels = exr.read_channels(path)
+    layer = lambda name: np.stack([channels[f"{name}.{c}"] for c in "RGB"], -1).astype(np.float32)
     found: dict[int, list[np.ndarray]] = {}
     for name in sorted(channels):
-        if (match := NOISY.fullmatch(name)) and int(match[1]) in SHARES:
-            layer = np.stack([channels[f"{name[:-1]}{c}"] for c in "RGB"], axis=-1)
-            found.setdefault(int(match[1]), []).append(layer)
+        if match := NOISY.fullmatch(name):
+            found.setdefault(int(match[1]), []).append(layer(name[:-2]))
     if not found:
-        raise ValueError(
-            f"{path}: no noisy layer indirect_N with N one of {', '.join(map(str, SHARES))}"
-        )
+        raise ValueError(f"{path}: no noisy layer indirect_N")
     frame = read_frame(path, next(iter(found)))
-    least = 1 if frame.reference is not None else 2
-    light = {spp: np.stack(layers) for spp, layers in found.items() if len(layers) >= least}
-    if not light or frame.ao is None:
-        raise ValueError(f"{path}: needs a layer ao, and reference or two of the same indirect_N")
-    kept = frame_inputs(frame, features.GUIDES)
-    return dataclasses.replace(kept, albedo=frame.albedo, reference=frame.reference), light
+    if "target.R" in channels:
+        frame = dataclasses.replace(frame, reference=layer("target"))
+    if frame.reference is None:
+        raise ValueError(f"{path}: needs a layer reference")
+    return frame, found
 
 
-def _places(height: int, width: int, random: np.random.Generator) -> Iterator[tuple[slice, slice]]:
-    """Crops of `HEIGHT` x `WIDTH` pixels side by side, the first at a random place."""
-    if height < HEIGHT or width < WIDTH:
-        raise ValueError(f"frames of {width} x {height}: they must be {WIDTH} x {HEIGHT} at least")
-    top, left = random.integers(height % HEIGHT + 1), random.integers(width % WIDTH + 1)
-    for y in range(top, height - HEIGHT + 1, HEIGHT):
-        for x in range(left, width - WIDTH + 1, WIDTH):
-            yield slice(y, y + HEIGHT), slice(x, x + WIDTH)
+def realisations(
+    light: dict[int, list[np.ndarray]], random: np.random.Generator
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Samples per pixel and noisy light `(H, W, 3)`: layers, their means, and mixtures.
 
-
-def _cut(frame: Frame, place: tuple[slice, slice]) -> Frame:
-    return jax.tree.map(lambda a: a[place].copy(), frame)
-
-
-def _teaches(crop: Crop) -> bool:
-    surface = 1 if crop.frame.mask is None else np.mean(crop.frame.mask)
-    light = np.mean(crop.frame.albedo * _wanted(crop))
-    return bool(surface >= LEAST_SURFACE and 0 < light < np.inf)
-
-
-def _wanted(crop: Crop) -> np.ndarray:
-    """What its mean brightness is taken from: the reference, or else the mean of what there is."""
-    if crop.frame.reference is not None:
-        return np.asarray(crop.frame.reference)
-    return np.asarray(np.mean(crop.light[max(crop.light)], axis=0, dtype=np.float32))
-
-
-def draw(crop: Crop, random: np.random.Generator) -> Example:
-    """The crop under a new realisation of the noise, with what precedes the network."""
-    frame, exposure = renewed(crop, random)
-    return Example(*prepared(frame), frame.albedo, shown(frame, exposure), exposure)
-
-
-def renewed(crop: Crop, random: np.random.Generator) -> tuple[Frame, np.float32]:
-    """The crop under a new realisation of the noise, mixed from those that there are, mirrored and
-    recoloured, with its target as `reference`; and its exposure."""
-    counts = sorted(crop.light)
-    shares = np.array([SHARES[spp] for spp in counts])
-    layers = crop.light[counts[random.choice(len(counts), p=shares / shares.sum())]]
-    target = crop.frame.reference
-    if target is None:
-        layers = random.permutation(layers)
-        layers, target = layers[1:], layers[0].astype(np.float32)
-    frame = dataclasses.replace(crop.frame, indirect=mixed(layers, random), reference=target)
-    exposure = np.float32(MEAN_BRIGHTNESS / np.mean(crop.frame.albedo * _wanted(crop)))
-    return augment(frame, random), exposure
-
-
-def shown(frame: Frame, exposure: np.float32) -> np.ndarray:
-    """The reflected light that is wanted of a frame, as exposed, `(H, W, 3)`."""
-    return np.clip(np.asarray(frame.albedo) * frame.reference * exposure, 0, 1e4)
-
-
-def mixed(images: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Each pixel from one of the images `(N, H, W, 3)`; `(H, W, 3)` in float32.
-
-    Pixels have random streams of their own, so this is as good a realisation as any of them, and
-    without such the network learns the few that there are by heart.
+    Pixels have random streams of their own, so an image that takes each pixel from one of several
+    is as good a realisation as any of them; without such the network learns the few by heart.
     """
-    chosen = random.integers(len(images), size=(1, *images.shape[1:3], 1))
-    return np.take_along_axis(images, chosen, axis=0)[0].astype(np.float32)
+    found = {spp: list(images) for spp, images in light.items()}
+    for spp, images in light.items():
+        if len(images) > 1:
+            found.setdefault(spp * len(images), []).append(np.mean(images, axis=0))
+    for spp, images in sorted(found.items()):
+        yield from ((spp, image) for image in images)
+        if len(images) > 1:
+            for _ in images:
+                chosen = random.integers(len(images), size=(1, *images[0].shape[:2], 1))
+                yield spp, np.take_along_axis(np.stack(images), chosen, axis=0)[0]
 
 
-def prepared(frame: Frame) -> tuple[Parts, Known]:
-    """What precedes the network for one frame: arrays, and what is known of the whole."""
-    return jax.tree.map(np.asarray, _prepared(frame_inputs(frame, features.GUIDES)))
+def _record(
+    frame: Frame, light: dict[int, list[np.ndarray]], random: np.random.Generator
+) -> np.ndarray:
+    height, width = frame.depth.shape[:2]
+    if min(height, width) < CROP:
+        raise ValueError(f"a frame of {width} x {height}; training needs {CROP} x {CROP} at least")
+    albedo, target = np.asarray(frame.albedo), np.asarray(frame.reference)
+    scale = exposure(albedo * target)
+    wanted = display(albedo * target, scale)
+    fields: dict[str, list[Any]] = {name: [] for name in (*OF_NOISE, "spp", "exposure", "occluded")}
+    errors = []
+    for spp, noisy in realisations(light, random):
+        occluded = frame.ao is not None and random.random() < OCCLUDED
+        read, unit = before_network(dataclasses.replace(frame, indirect=noisy), occluded)
+        for name in OF_NOISE:
+            fields[name].append(getattr(read, name))
+        fields["spp"].append(spp)
+        fields["exposure"].append(unit * scale)
+        fields["occluded"].append(occluded)
+        errors.append(np.mean((display(albedo * read.light, unit * scale) - wanted) ** 2))
+        if occluded or len(errors) == 1:
+            guides = read
+    of_all = {name: np.asarray(getattr(guides, name)) for name in ("normal", "depth", "ao", "mask")}
+    of_all |= {"albedo": albedo, "target": np.clip(target * scale, 0, BRIGHTEST)}
+    groups = np.searchsorted(list(SHARES), fields["spp"], side="right")
+    own = [np.mean([e for e, g in zip(errors, groups, strict=True) if g == k]) for k in groups]
+    found: dict[str, np.ndarray]
+    found = {name: np.asarray(value, np.float16) for name, value in of_all.items()}
+    found |= {name: np.asarray(fields[name], np.float16) for name in OF_NOISE}
+    found |= {"spp": np.array(fields["spp"]), "occluded": np.array(fields["occluded"])}
+    found |= {"exposure": np.array(fields["exposure"], np.float32)}
+    found |= {"own": np.maximum(own, FLOOR).astype(np.float32), "group": groups}
+    record = np.zeros(1, [(name, value.dtype, value.shape) for name, value in found.items()])
+    for name, value in found.items():
+        record[name][0] = value
+    return record
 
 
-@jax.jit
-def _prepared(frame: Frame) -> tuple[Parts, Known]:
-    images = DEFAULT.images(frame, features.GUIDES)
-    parts, known = run(DEFAULT.before_network(), DEFAULT, images, DEFAULT.known(images))
-    kept = {name: parts[name] for name in ("read", "output", "moments")}
-    return kept | {"guides": jnp.concatenate(images["guides"], axis=-1)}, known
+def before_network(frame: Frame, occluded: bool = True) -> tuple[Read, float]:
+    """What the network reads of a frame, and the unit of its light.
+
+    occluded: with the occlusion that the frame may have.
+    """
+    names = GUIDES if occluded and frame.ao is not None else NEEDED
+    read, unit = jax.tree.map(np.asarray, _before(frame_inputs(frame, names), names))
+    return read, float(unit)
 
 
-def has_reference(path: Path) -> bool:
-    """Whether the frame can be trained towards a reference."""
-    return "reference.R" in exr.read_channels(path)
+@jax.jit(static_argnames="names")
+def _before(frame: Frame, names: tuple[str, ...]) -> tuple[Read, jax.Array]:
+    method = FLNR(params={})
+    images = method.images(frame, names)
+    stages = method.stages()[:-2]
+    parts, known = run(stages, method, images, method.known(images))
+    return flnr.to_read(parts, known), known["mean"] * known["unit"]
+
+
+def draw(record: np.ndarray, random: np.random.Generator) -> Example:
+    """A crop under one realisation, mirrored, transposed and recoloured, its normals turned."""
+    groups = record["group"][0]
+    shares = np.array(list(SHARES.values()))[groups]
+    shares /= np.bincount(groups)[groups]
+    chosen = random.choice(len(groups), p=shares / shares.sum())
+    height, width = record["mask"].shape[1:3]
+    for _ in range(TRIES):
+        top, left = random.integers(height - CROP + 1), random.integers(width - CROP + 1)
+        place = slice(top, top + CROP), slice(left, left + CROP)
+        if np.mean(record["mask"][0][place], dtype=np.float32) > LEAST_SURFACE:
+            break
+    axes = tuple(axis for axis in (0, 1) if random.random() < 0.5)
+    turned, order = random.random() < 0.5, random.permutation(3)
+    tint = np.exp(0.15 * random.normal(size=3)).astype(np.float32)
+    tint /= tint.mean()
+    rotation = np.linalg.qr(random.normal(size=(3, 3)))[0].astype(np.float32)
+
+    def cut(name: str) -> np.ndarray:
+        image = record[name][0, chosen] if name in OF_NOISE else record[name][0]
+        image = np.flip(image[place].astype(np.float32), axes)
+        return image.transpose(1, 0, 2) if turned else image
+
+    light, noisy, albedo, target = (
+        cut(name)[..., order] for name in ("light", "noisy", "albedo", "target")
+    )
+    mask = cut("mask")
+    ao = cut("ao") if record["occluded"][0, chosen] else mask
+    read = Read(
+        light * tint, noisy * tint, cut("error"), cut("normal") @ rotation, cut("depth"), ao, mask
+    )
+    of_frame = record["exposure"][0, chosen], record["own"][0, chosen]
+    return Example(read, albedo, target * tint, *of_frame)
 
 
 def digest(paths: Sequence[Path]) -> str:

@@ -1,146 +1,90 @@
-"""What the network reads: planes on blocks, free of units.
+"""What the network reads: of every pixel, and of means over 2, 4, 8 and 16 pixels; free of units.
 
-Light is divided by the frame's mean before its logarithm is taken, so what is read does not change
-with the scale of the light, and depth comes divided by its median.
+Light is divided by the frame's mean before, so what is read does not change with its scale.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any, NamedTuple
 
 from jflnr.lazy import jax, jnp
-from jflnr.network import unet
-from jflnr.regression.level import Grid, brightness, mean_guides, predict
-from jflnr.regression.moments import index_xx, index_xy
-from jflnr.regression.pyramid import double, halve
-from jflnr.regression.widths import Step
 
-# The guides that the features are made of: normal (3), depth, ambient occlusion.
-GUIDES = ("normal", "depth", "ao")
-CHANNELS = 3
-# Light below this share of the frame's mean is as good as dark.
-DARK = 0.03
-# Guides that vary by more inside a block are beyond all that the network has seen.
-MOST_SPREAD = 9.0
-BLURS = 4
-OF_GRID, OF_STEP = 6, 6
-COUNT = 4 * (OF_GRID + OF_STEP + CHANNELS) + 2 * OF_STEP + BLURS + 2
+# Of every pixel, and of every mean.
+PIXEL, POOLED = 15, 6
+# Light below such shares of the frame's mean is as good as dark.
+DARK = 0.02
+# No light is brighter, in means of the frame: squares of fireflies must not overflow.
+BRIGHTEST = 6e4
+LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
-def of_steps(steps: list[Step], guides: int, mean: jax.Array) -> jax.Array:
-    """What is read of blocks twice as large as the finest: `(COUNT - 2, h, w)`.
+class Read(NamedTuple):
+    """The images that are read, `(H, W, 3)` or `(H, W, 1)`; zeros where `mask` is 0.
 
-    The finest blocks lie side by side as channels. steps: coarse to fine. mean: of the frame.
+    light, noisy: the light of adaptive FLR, and that before it, over the frame's mean brightness.
+    error: standard error of its brightness. depth: over its median. ao: 1 where there is none.
     """
-    last = steps[-1]
-    colour = colour_of(last.merged, last.grid.moments, guides)
-    light = log_light(_brightness(colour), mean)
-    finest = [
-        of_grid(last.grid, guides, mean),
-        of_step(last, mean),
-        log_light(colour, mean) - light,
+
+    light: Any
+    noisy: Any
+    error: Any
+    normal: Any
+    depth: Any
+    ao: Any
+    mask: Any
+
+
+def luminance(light: jax.Array) -> jax.Array:
+    """`(H, W, 3)` to `(H, W, 1)`."""
+    return light @ jnp.asarray(LUMINANCE, light.dtype)[:, None]
+
+
+def of_pixels(read: Read) -> jax.Array:
+    """`(H, W, PIXEL)`."""
+    light, noisy = luminance(read.light), luminance(read.noisy)
+    residual = (noisy - light) / (light + 0.05)
+    planes = [
+        jnp.log(light + DARK),
+        jnp.clip(residual, -1, 4) / 2,
+        jnp.log1p((noisy + 0.05) / (light + 0.05)),
+        jnp.log(read.error / (light + 0.05) + 0.01) + 1.5,
+        jnp.log((read.light + DARK) / (light + DARK)),
+        read.normal,
+        jnp.log(read.depth + 0.05),
+        2 * read.ao - 1,
+        jnp.minimum(read.error, 3),
+        read.mask,
+        jnp.log(noisy + 0.03),
     ]
-    packed = unet.pack(jnp.concatenate(finest))
-    size = packed.shape[:2]
-    coarser = [double(of_step(steps[0], mean), *size), of_step(steps[1], mean)]
-    planes = [*coarser, blurred_light(last.grid, guides, mean)]
-    return jnp.concatenate([jnp.moveaxis(packed, -1, 0), *planes])
+    return jnp.concatenate(planes, axis=-1)
 
 
-def with_means(read: jax.Array, means: jax.Array, mean: jax.Array) -> jax.Array:
-    """All that is read: `of_steps` and what is the same everywhere, `(h, w, COUNT)`.
+def of_means(read: Read, scales: int) -> list[jax.Array]:
+    """What is left in the means: noisy over denoised light, and the noise.
 
-    means: of the frame's `light_planes`, brightness and its logarithm.
+    The noisy light also without what exceeds the denoised one four times.
+    Returns `(H / n, W / n, POOLED)` for n = 2, 4, ..., the last of which divides H and W.
     """
-    whole = jnp.stack([jnp.log(means[0] / mean + 0.1), means[1]])
-    whole = jnp.broadcast_to(whole[:, None, None], (2, *read.shape[1:]))
-    return jnp.moveaxis(jnp.concatenate([read, whole]), 0, -1)
+    light, noisy = luminance(read.light), luminance(read.noisy)
+    robust = jnp.minimum(noisy, 4 * light + 0.1)
+    means = [read.light, light, read.noisy, noisy, robust, (noisy - light) ** 2]
+    planes = jnp.concatenate(means, axis=-1)
+    found = []
+    for scale in range(1, scales + 1):
+        planes = halved(planes)
+        before, after, square = planes[..., :4], planes[..., 4:8], planes[..., 9:]
+        light, robust = planes[..., 3:4], planes[..., 8:9]
+        noise = square / 4**scale / (light + DARK) ** 2
+        left = [_ratio(after, before), _ratio(robust, light), 0.5 * jnp.log(noise + 1e-3)]
+        found.append(jnp.concatenate(left, axis=-1))
+    return found
 
 
-def colour_of(models: jax.Array, moments: jax.Array, guides: int) -> jax.Array:
-    """The light that models `(Q + 1, C, h, w)` give their blocks, `(C, h, w)`."""
-    return jnp.einsum("qchw,qhw->chw", models, mean_guides(moments, guides))
+def halved(image: jax.Array) -> jax.Array:
+    """Means over 2 x 2 pixels of an image of even size."""
+    height, width, count = image.shape
+    return image.reshape(height // 2, 2, width // 2, 2, count).mean((1, 3))
 
 
-def light_planes(colour: jax.Array, mean: jax.Array) -> jax.Array:
-    """Of every block its brightness, the logarithm of that, and 1: `(3, h, w)`.
-
-    colour: `(C, h, w)`.
-    """
-    light = _brightness(jnp.maximum(colour, 0))
-    return jnp.stack([light, log_light(_brightness(colour), mean), jnp.ones_like(light)])
-
-
-def log_light(light: jax.Array, mean: jax.Array) -> jax.Array:
-    """Logarithm of light relative to the frame's mean, near 0 on average."""
-    return jnp.log(jnp.maximum(light, 0) / mean + DARK)
-
-
-def of_grid(grid: Grid, guides: int, mean: jax.Array) -> jax.Array:
-    """What blocks know before any fit: how guides vary, light and its noise. `(OF_GRID, h, w)`.
-
-    The guides' own values are left out: with them the network learns the training scenes by heart.
-    """
-    n = grid.moments[0]
-    inverse = jnp.where(n > 1e-12, 1 / jnp.where(n > 1e-12, n, 1), 0)
-    centred = mean_guides(grid.moments, guides)[1:]
-    diagonal = np.array([index_xx(i + 1, i + 1) for i in range(guides)])
-    variance = jnp.maximum(grid.moments[diagonal] * inverse - centred**2, 0)
-    spread = jnp.stack([jnp.sum(variance[:3], axis=0), variance[3], variance[4]])
-    light = _light(grid.moments, guides) * inverse
-    noise = jnp.sqrt(grid.noise[0] + 1e-12 * mean**2) * inverse
-    own = [jnp.log(n + 0.01), log_light(light, mean), log_light(noise, mean)]
-    spread = jnp.minimum(spread, MOST_SPREAD)
-    return jnp.concatenate([4 * jnp.sqrt(spread + 1e-4), jnp.stack(own)])
-
-
-def of_step(step: Step, mean: jax.Array) -> jax.Array:
-    """What one level's fit found, beside the coarser one: `(OF_STEP, h, w)`."""
-    regressors = mean_guides(step.grid.moments, step.fine.coefficients.shape[0] - 1)
-    reference = step.level**2 + 0.01 * mean**2
-    return jnp.stack(
-        [
-            log_light(step.level, mean),
-            log_light(predict(step.fine.coefficients, regressors), mean),
-            log_light(predict(step.coarse.coefficients, regressors), mean),
-            jnp.log(step.fine.variance / reference + 1e-3) / 2,
-            jnp.log(step.coarse.variance / reference + 1e-3) / 2,
-            step.share,
-        ]
-    )
-
-
-def blurred_light(grid: Grid, guides: int, mean: jax.Array) -> jax.Array:
-    """The light averaged over ever wider windows, on the grid half as fine: `(BLURS, h, w)`."""
-    planes = halve(jnp.stack([grid.moments[0], _light(grid.moments, guides)]))
-    sizes, found = [planes.shape[1:]], []
-    for _ in range(BLURS):
-        n, light = _tent(planes)
-        light = (light / jnp.maximum(n, 1e-9))[None]
-        for height, width in reversed(sizes[:-1]):
-            light = double(light, height, width)
-        found.append(log_light(light, mean))
-        planes = halve(planes)
-        sizes.append(planes.shape[1:])
-    return jnp.concatenate(found)
-
-
-def _brightness(colour: jax.Array) -> jax.Array:
-    return jnp.einsum("chw,c->hw", colour, brightness(CHANNELS, colour.dtype))
-
-
-def _light(moments: jax.Array, guides: int) -> jax.Array:
-    start = index_xy(0, 0, guides, CHANNELS)
-    return _brightness(moments[start : start + CHANNELS])
-
-
-def _tent(planes: jax.Array) -> jax.Array:
-    """Weights 1, 2, 1 along rows and columns, zeros beyond the border."""
-    for axis in (1, 2):
-        margin = [(1, 1) if a == axis else (0, 0) for a in range(3)]
-        padded = jnp.pad(planes, margin)
-        size = planes.shape[axis]
-        before = jax.lax.slice_in_dim(padded, 0, size, axis=axis)
-        after = jax.lax.slice_in_dim(padded, 2, size + 2, axis=axis)
-        planes = (before + 2 * planes + after) / 4
-    return planes
+def _ratio(after: jax.Array, before: jax.Array) -> jax.Array:
+    return jnp.log((after + 0.05 * before + DARK) / (1.05 * before + DARK))

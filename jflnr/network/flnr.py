@@ -1,11 +1,10 @@
-"""FLNR: the pyramid of adaptive FLR under windows that a small network steers (section 3.3).
+"""FLNR: adaptive FLR, and a small network that corrects its light at every pixel (section 3.3).
 
-The paper's network gives the regression better guides at every pixel. One sample per pixel is so
-sparse that most of what such a network does is averaging, which the pyramid does already. So here
-a first regression comes before the network, which reads on blocks what its fits found. It says for
-every block what else must be alike in a window, how wide the window is and how much the block
-counts, and the fits are made anew; and it says where their light is too much or missing (shadows
-that no guide shows, fireflies). It ends in zeros before training: FLNR then is adaptive FLR.
+The paper's network gives the regression better guides at every pixel. Here the regression comes
+first: it averages, which is most of what there is to do at few samples, and tells how far it may be
+off. The network then sees where its light and the noisy one differ, on several scales, and what the
+guides are there, and says by which factor the light is wrong: edges of shadows, pools of light,
+fireflies. It ends in zeros before training: FLNR then is adaptive FLR.
 """
 
 from __future__ import annotations
@@ -13,41 +12,37 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any
 
 from jflnr.frame import Array, Frame
 from jflnr.images.guides import Scene
-from jflnr.images.inputs import robust_images
+from jflnr.images.inputs import robust_images, same_size
 from jflnr.images.noisy_guides import smooth_guide
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
-from jflnr.regression import adaptive, energy, widths
+from jflnr.regression import adaptive
 from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.arguments import check_regression
-from jflnr.regression.floor import with_own_light
-from jflnr.regression.level import Grid, mean_guides
+from jflnr.regression.arguments import channel_count, check_regression, layers_of
 from jflnr.regression.moments import Guides
-from jflnr.regression.pyramid import halve
 from jflnr.stages import Known, Parts, Stage, regress
 
-# Planes in which the blocks of a window must be alike: the guides and the brightness.
-ALIKE = 6
-# Planes that the network gives, and where its parts end.
-PLANES, ENDS = ALIKE + 2 + features.CHANNELS, (ALIKE, ALIKE + 1, ALIKE + 2)
-# Logarithms of the largest factors on a block's gain, on what it counts and on its window's width.
-LARGEST_GAIN, LARGEST_WEIGHT, LARGEST_WIDTH = 2.0, 2.0, 0.7
+# Guides that the network was trained with: normal (3), depth and, where a frame has it, occlusion.
+NEEDED, GUIDES = ("normal", "depth"), ("normal", "depth", "ao")
+COLOURS = 3
+# Least and largest of the guides' channels that the network sees.
+LIMITS = ((-1, -1, -1, 0, 0), (1, 1, 1, 100, 1))
+# Logarithm of the largest factor on the light.
+LARGEST = 1.5
 
 
 @pytree
 @dataclass(frozen=True)
 class FLNR(AdaptiveFLR):
-    """Adaptive FLR, steered by a network (docs/flnr.md).
+    """Adaptive FLR, corrected by a network (docs/flnr.md).
 
     params: weights, as from `jflnr.network.weights.load`; those that ship for the `size` if None.
-    size: of the network: tiny, small or base.
+    size: of the network: small or base. with_error: tell the error of what the network corrects.
     """
-
-    guides: ClassVar[tuple[str, ...]] = features.GUIDES
 
     params: Any = None
     size: str = field(default="base", metadata={"static": True})
@@ -56,6 +51,11 @@ class FLNR(AdaptiveFLR):
     def name(self) -> str:  # type: ignore[override]
         return "flnr" if self.size == "base" else f"flnr-{self.size}"
 
+    @property
+    def tells_error(self) -> bool:
+        """The network reads it."""
+        return True
+
     @staticmethod
     def images(
         frame: Frame,
@@ -63,30 +63,26 @@ class FLNR(AdaptiveFLR):
         scene: Scene | None = None,
         smooth: Callable[..., Array] = smooth_guide,
     ) -> Parts:
-        """Those of the guides that the network was trained with, in their order."""
-        return robust_images(frame, features.GUIDES, scene, smooth)
+        """The guides in the order in which the network takes them."""
+        ordered = tuple(name for name in GUIDES if name in names)
+        return robust_images(frame, ordered, scene, smooth)
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> FLNR:
-        light, normal = frame.indirect.shape, frame.normal.shape
-        if sorted(names) != sorted(self.guides):
+        same_size(frame, self.name)
+        if set(names) not in (set(NEEDED), set(GUIDES)):
             raise ValueError(
-                f"method {self.name} was trained with the guides {', '.join(self.guides)} and "
-                f"works with no others; got {', '.join(names) or 'none'}. flr and flr-adaptive "
-                "take any"
+                f"method {self.name} was trained with the guides normal, depth and, where there is "
+                f"one, ao; got {', '.join(names) or 'none'}. flr and flr-adaptive take any"
             )
-        if light != normal:
-            raise ValueError(
-                f"method {self.name} needs frame.indirect of three channels and as large as the "
-                f"guides; got {light} and {normal}"
-            )
-        return self.with_weights()
+        return self.ready(len(names) + 2, frame.indirect.shape[2])
 
-    def with_weights(self) -> FLNR:
-        """With the weights that ship, if it has none."""
-        if self.block != AdaptiveFLR.block:
-            raise ValueError(f"method {self.name} works with block {AdaptiveFLR.block} only")
-        if self.with_error:
-            raise ValueError(f"method {self.name} tells no error; flr-adaptive does")
+    def ready(self, guides: int, channels: int) -> FLNR:
+        """With the weights that ship, if it has none. guides, channels: how many it is to take."""
+        if guides not in (4, 5) or channels % COLOURS:
+            raise ValueError(
+                f"method {self.name} needs 4 or 5 channels of guides, and light of three, or of "
+                f"groups of three; got {guides} and {channels}"
+            )
         if self.params is not None:
             return self
         from jflnr.network.weights import shipped
@@ -94,43 +90,26 @@ class FLNR(AdaptiveFLR):
         return dataclasses.replace(self, params=shipped(self.name))
 
     def stages(self) -> tuple[Stage, ...]:
-        return (*self.before_network(), *self.with_network())
-
-    def before_network(self) -> tuple[Stage, ...]:
-        """Passes 1 and 2 and a first fit, in which nothing depends on the weights."""
         side = self.finest
+        *before, fits, _ = AdaptiveFLR.stages(dataclasses.replace(self, keep_energy=False))
+        given = tuple(name for name, _ in fits.gives)
+        scales = unet.scales_of(self.params)
+        gives = (("image", 0), *([("error", 0)] if self.with_error else []))
         return (
-            *adaptive.first_stages(side),
+            *before,
+            fits,
+            Stage(evaluate, (("fitted", 0), ("noise", 0)), given, pixels=True, reach=2 * side),
             Stage(
-                fit_first,
-                (("read", 2 * side), ("output", 2 * side)),
-                ("moments", "light"),
-                reach=adaptive.reach_of(self.levels) * side,
-                align=side << features.BLURS,
-                totals=(("kept", 2 * side), ("light_of_models", side)),
-                learn=learn_first,
+                correct,
+                (("image", 0),),
+                ("fitted", "noise"),
+                pixels=True,
+                reach=unet.reach_of(scales),
+                align=1 << scales,
+                totals=(("sums", 1),),
+                learn=learn_share,
             ),
-        )
-
-    def with_network(self) -> tuple[Stage, ...]:
-        """What the network says, the fits as it says, and pass 3."""
-        side, scales = self.finest, unet.scales_of(self.with_weights().params)
-        return (
-            Stage(
-                steer,
-                (("steering", side),),
-                ("read",),
-                reach=2 * side * unet.reach_of(scales),
-                align=2 * side << (scales - 1),
-            ),
-            Stage(
-                fit_steered,
-                (("models", side),),
-                ("moments", "steering", "output"),
-                reach=adaptive.reach_of(self.levels) * side,
-                align=side << (self.levels - 1),
-            ),
-            *adaptive.last_stages(evaluate, side, ("models",), self),
+            Stage(restore, gives, ("image", "noise")),
         )
 
 
@@ -144,105 +123,84 @@ def flnr(
     *,
     weight: jax.Array | None = None,
     **options: Any,
-) -> jax.Array:
+) -> Any:
     """Denoise with the network's help. Scales with `target`.
 
-    target: `(H, W, 3)`, the noisy radiance, not negative. guides: `(H, W, 5)` or several arrays:
-    normal, depth over its typical value, ambient occlusion. method, options: as of `flr_adaptive`.
-    weight: `(H, W)`, a mask; 0 removes a pixel, as does any value that is not finite.
-    Returns `(H, W, 3)`.
+    target: `(H, W, C)`, the noisy radiance, not negative; C is 3, or 6, 9, ... for light groups,
+    whose results sum to the denoised sum. guides: `(H, W, 5)` or several arrays: normal, depth over
+    its typical value, ambient occlusion, which may be missing. method, options: as of
+    `flr_adaptive`. weight: `(H, W)`, a mask; 0 removes a pixel, as does any value that is not
+    finite.
+    Returns `(H, W, C)`; `with_error` also `(H, W, 1)`, the standard error of its brightness.
+
+    Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
-    method = dataclasses.replace(method, **options).with_weights()
     check_regression(target, guides, None, weight)
-    return regress(method, {"target": target, "guides": guides, "weight": weight})["image"]
+    method = dataclasses.replace(method, **options).ready(channel_count(guides), target.shape[2])
+    given = regress(method, {"target": target, "guides": guides, "weight": weight})
+    return (given["image"], given["error"]) if method.with_error else given["image"]
 
 
 def init(key: jax.Array, widths: Sequence[int]) -> unet.Params:
     """Weights with which FLNR is adaptive FLR. widths: channels of the network, fine to coarse."""
-    return unet.init(key, features.COUNT, widths, (4 * PLANES,))
-
-
-class Steering(NamedTuple):
-    """What the network says of the finest blocks; 0 everywhere changes nothing.
-
-    alike: `(ALIKE, h, w)`, added to what must be alike in a window. wider, weight: `(1, h, w)`,
-    logarithms of factors on the window's width and on what the block counts in windows. gain:
-    `(C, h, w)`, logarithm of a factor on the light.
-    """
-
-    alike: jax.Array
-    wider: jax.Array
-    weight: jax.Array
-    gain: jax.Array
-
-
-def fit_first(method: FLNR, parts: Parts, known: Known) -> Parts:
-    """The first fit: what the network reads of it, and the brightness of its models."""
-    grid = adaptive.grid_of(parts["moments"], method.finest)
-    coarsest, steps = adaptive.fit_steps(method, grid, known)
-    mean, guides = known["mean"], known["shift"].size
-    given = adaptive.merged_parts(coarsest, steps, parts["light"], grid, known)
-    colour = features.colour_of(steps[-1].merged, grid.moments, guides)
-    return {
-        "read": features.of_steps(steps, guides, mean),
-        "output": given["output"],
-        "kept": given["kept"],
-        "light_of_models": features.light_planes(colour, mean),
-    }
-
-
-def learn_first(method: FLNR, known: Known, sums: Parts) -> Known:
-    """How much brightness is given back, and means of the light of the models."""
-    linear, logarithmic, count = sums["light_of_models"]
-    return adaptive.learn_rate(method, known, sums) | {
-        "means": jnp.stack([linear, logarithmic]) / count
-    }
-
-
-def steer(method: FLNR, parts: Parts, known: Known) -> Parts:
-    """Let the network read, `(PLANES, h, w)`."""
-    read = parts["read"]
-    x = features.with_means(read, known["means"], known["mean"])
-    planes = unet.unpack(unet.apply(method.params, x)[0], 2 * read.shape[1], 2 * read.shape[2])
-    alike, wider, weight, gain = jnp.split(planes, ENDS)
-    steering = Steering(
-        alike,
-        _within(wider, LARGEST_WIDTH),
-        _within(weight, LARGEST_WEIGHT),
-        _within(gain, LARGEST_GAIN),
-    )
-    return {"steering": jnp.concatenate(steering)}
-
-
-def fit_steered(method: FLNR, parts: Parts, known: Known) -> Parts:
-    """Fit anew and correct the light as the network says: models `(Q + 2, C, h, w)`."""
-    size = parts["moments"].shape[1:]
-    says = Steering(*jnp.split(parts["steering"][:, : size[0], : size[1]], ENDS))
-    grid, weight = adaptive.grid_of(parts["moments"], method.finest), jnp.exp(says.weight)
-    weighted = Grid(grid.moments * weight, grid.noise * weight**2, grid.block)
-    # Coarser blocks are steered by the mean of the finest in them.
-    planes = jnp.concatenate([says.alike, says.wider])
-    said = list[widths.Said]()
-    for _ in range(method.levels):
-        said.append(widths.Said(planes[:-1], jnp.exp(planes[-1])))
-        planes = halve(planes)
-    shift, mean = known["shift"], known["mean"]
-    levels = widths.fit_levels(
-        weighted, shift, features.CHANNELS, method.levels, mean, method, said
-    )
-    merged = energy.scale(widths.merged_models(*levels), parts["output"], known["rate"])
-    # Without light there is none for the gain to act on, either.
-    dark = jnp.where(known["wanted"] > 0, features.DARK * mean, 0)
-    gain = jnp.exp(says.gain)
-    light = (merged[:1] + dark) * gain - dark
-    models = jnp.concatenate([light, merged[1:] * gain])
-    return {"models": with_own_light(models, mean_guides(grid.moments, shift.size))}
+    return unet.init(key, features.PIXEL, features.POOLED, widths, COLOURS)
 
 
 def evaluate(method: FLNR, parts: Parts, known: Known) -> Parts:
-    """Pass 3."""
-    return adaptive.light_parts(method, parts["models"], parts, known)
+    """Pass 3: the light that the network is to correct, and its error."""
+    given = adaptive.evaluate(method, parts, known)
+    return {"fitted": given["image"], "noise": given["error"]}
 
 
-def _within(x: jax.Array, limit: float) -> jax.Array:
-    return limit * jnp.tanh(x / limit)
+def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
+    """The corrected light, `(H, W, C)`, and the brightness before and after."""
+    light, read = parts["fitted"], to_read(parts, known)
+    gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
+    image = light * jnp.tile(gain, light.shape[2] // COLOURS)
+    return {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
+
+
+def learn_share(method: FLNR, known: Known, sums: Parts) -> Known:
+    """What brings the brightness of the result near the input's."""
+    before, after = sums["sums"]
+    slack = 0 if method.keep_energy else method.slack
+    wanted = jnp.clip(after, (1 - slack) * before, (1 + slack) * before)
+    return {"share": jnp.where(after > 0, wanted / jnp.where(after > 0, after, 1), 1)}
+
+
+def restore(method: FLNR, parts: Parts, known: Known) -> Parts:
+    """The result with the brightness of the input, and the error of what was corrected."""
+    given = {"image": parts["image"] * known["share"]}
+    return given | ({"error": parts["noise"]} if method.with_error else {})
+
+
+def to_read(parts: Parts, known: Known) -> features.Read:
+    """The images that the network reads, from those of adaptive FLR and its results."""
+    target, guides = parts["target"], jnp.concatenate(layers_of(parts["guides"]), axis=-1)
+    usable = jnp.all(jnp.isfinite(target), axis=-1) & jnp.all(jnp.isfinite(guides), axis=-1)
+    if parts["weight"] is not None:
+        usable &= parts["weight"] > 0
+    usable = usable[..., None]
+    unit = known["mean"] * known["unit"]
+
+    def shown(image: jax.Array) -> jax.Array:
+        return jnp.where(usable, jnp.clip(image / unit, 0, features.BRIGHTEST), 0)
+
+    groups = (*target.shape[:2], target.shape[2] // COLOURS, COLOURS)
+    light, noisy = (x.reshape(groups).sum(2) for x in (parts["fitted"], target))
+    lowest, highest = jnp.asarray(LIMITS, guides.dtype)[:, : guides.shape[2]]
+    guides = jnp.where(usable, jnp.clip(guides, lowest, highest), 0)
+    ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(usable, 1.0, 0.0)
+    mask = usable.astype(light.dtype)
+    images = shown(light), shown(noisy), shown(parts["noise"])
+    return features.Read(*images, guides[..., :3], guides[..., 3:4], ao.astype(mask.dtype), mask)
+
+
+def gains(params: unet.Params, read: features.Read) -> jax.Array:
+    """The factor on the light of every pixel, `(H, W, 3)`."""
+    height, width = read.mask.shape[:2]
+    scales = unet.scales_of(params)
+    margins = [(0, -size % (1 << scales)) for size in (height, width)] + [(0, 0)]
+    read = jax.tree.map(lambda image: jnp.pad(image, margins), read)
+    out = unet.apply(params, features.of_pixels(read), features.of_means(read, scales))
+    return jnp.exp(LARGEST * jnp.tanh(out[:height, :width] / LARGEST))

@@ -1,4 +1,4 @@
-"""What training minimises: the error of what is shown, and SMAPE of the radiance."""
+"""What training minimises: errors of the picture as it is displayed."""
 
 from __future__ import annotations
 
@@ -6,28 +6,22 @@ import jax
 import jax.numpy as jnp
 
 from jflnr.metrics import GAMMA
-from jflnr.network import unet
-from jflnr.network.examples import Example
-from jflnr.network.flnr import FLNR
-from jflnr.stages import Known, Parts, run
+from jflnr.network import flnr, unet
+from jflnr.network.examples import FLOOR, Example
 
-# Mean squared error of a picture that is as good as its reference, whose noise is not ours to fit.
-FLOOR = 3e-4
 # Weight of SMAPE against decibels.
 SMAPE = 5.0
 DARKEST = 1e-3
 
 
-def light(params: unet.Params, parts: Parts, known: Known) -> jax.Array:
-    """The denoised light, `(H, W, 3)`, from what precedes the network."""
-    method = FLNR(params=params)
-    return run(method.with_network(), method, parts, known)[0]["image"]
+def relative_error(params: unet.Params, example: Example) -> jax.Array:
+    """Squared error of the displayed picture, over that of adaptive FLR on the whole frame.
 
-
-def to_reference(params: unet.Params, example: Example) -> jax.Array:
-    """For a target without noise: `shown_error`."""
-    picture = light(params, example.parts, example.known) * example.albedo * example.exposure
-    return shown_error(picture, example.target)
+    So every frame and every count of samples says about as much.
+    """
+    light = example.read.light * flnr.gains(params, example.read)
+    picture = example.albedo * light * example.exposure
+    return _error(picture, example.albedo * example.target) / example.error
 
 
 def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:
@@ -36,26 +30,12 @@ def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:
     Decibels, since PSNR is what pictures are judged by: every frame counts alike.
     picture, target: `(H, W, 3)`, reflected light as exposed.
     """
-    error = jnp.mean((_shown(picture) - _shown(jnp.minimum(target, 1))) ** 2)
     smape = jnp.mean(jnp.abs(picture - target) / (jnp.abs(picture) + target + 0.01))
-    return 10 * jnp.log10(error + FLOOR) + SMAPE * smape
+    return 10 * jnp.log10(_error(picture, target) + FLOOR) + SMAPE * smape
 
 
-def to_noisy(params: unet.Params, example: Example) -> jax.Array:
-    """For a target with noise of its own: `relative`."""
-    target = example.target
-    picture = light(params, example.parts, example.known) * example.albedo * example.exposure
-    return relative(picture, target)
-
-
-def relative(picture: jax.Array, target: jax.Array) -> jax.Array:
-    """Squared error relative to the squared output.
-
-    With the denominator left out of the derivative the minimum is at the target's mean, so other
-    noise of the same frame serves as well as its reference (Lehtinen et al. 2018, section 3.3).
-    """
-    scale = jax.lax.stop_gradient(jnp.maximum(picture, 0) + 0.05) ** 2
-    return jnp.mean((picture - target) ** 2 / scale)
+def _error(picture: jax.Array, target: jax.Array) -> jax.Array:
+    return jnp.mean((_shown(picture) - _shown(jnp.minimum(target, 1))) ** 2)
 
 
 def _shown(picture: jax.Array) -> jax.Array:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,47 +17,52 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from jflnr import metrics
-from jflnr.frame import Frame
-from jflnr.network import flnr, loss, unet
+from jflnr.network import adam, examples, flnr, loss, unet
 from jflnr.network.adam import Adam
 from jflnr.network.checkpoint import load_state, save_state
-from jflnr.network.examples import Crop, Example, draw, prepared
-from jflnr.stages import Known, Parts
+from jflnr.network.examples import Example, before_network, draw
+from jflnr.network.features import Read
 
-# Channels of the network, fine to coarse: of flnr-tiny, flnr-small and flnr.
-CONFIGS = {
-    "tiny": (8, 12, 16),
-    "small": (16, 24, 32),
-    "base": (32, 48, 64),
-}
+# Channels of the network, fine to coarse: of flnr-small and flnr.
+SIZES = {"small": (10, 16, 24, 32), "base": (20, 32, 56, 80)}
+# Samples per pixel that are validated.
+COUNTS = (1, 4, 16)
+# Steps until they have their size; the size of the last ones.
+WARM_UP, LEAST_RATE = 200, 2e-5
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a run is made of; with the crops it decides the trajectory.
+    """What a run is made of.
 
-    batch: crops per step. rate: size of the first steps, which shrinks slowly. every: steps
-    between validations. noisy_targets: whether targets have noise of their own.
+    batch: crops per step. rate: size of the first steps, which falls with a cosine to nearly
+    nothing. every: steps between validations.
     """
 
-    widths: tuple[int, ...] = CONFIGS["base"]
+    widths: tuple[int, ...] = SIZES["base"]
     seed: int = 0
-    batch: int = 4
-    rate: float = 1e-3
+    batch: int = 8
+    rate: float = 2e-3
     every: int = 500
-    noisy_targets: bool = False
 
 
 class Progress(NamedTuple):
-    """loss: mean since the last report. validation: PSNR in dB of the averaged weights."""
+    """seconds: since the run began. loss: mean since the last report. validation: mean PSNR in dB
+    of the averaged weights, by samples per pixel."""
 
     step: int
+    seconds: float
     loss: float
-    validation: float
+    validation: dict[str, float]
+
+    @property
+    def score(self) -> float:
+        """NaN without validation."""
+        return float(np.mean([*self.validation.values()])) if self.validation else float("nan")
 
 
 class Result(NamedTuple):
-    """params: the best by validation. history: one entry per validation."""
+    """params: the best by validation. history: one entry per validation, the first untrained."""
 
     params: unet.Params
     best: Progress
@@ -63,80 +70,82 @@ class Result(NamedTuple):
 
 
 def train(
-    crops: Sequence[Crop],
-    validation: Sequence[Frame],
+    records: Sequence[np.ndarray],
+    validation: Sequence[Path],
     settings: Settings,
     *,
-    initial: unet.Params | None = None,
+    seconds: float = float("inf"),
+    steps: float = float("inf"),
     state_file: Path | None = None,
-    stop: Callable[[int], bool],
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Result:
-    """Train until `stop(step)`; with a `state_file` that exists, go on where it was written.
+    """Train for so many seconds or steps, whichever end first; the steps' size follows.
 
-    Steps depend on the settings, the crops and their number only, so a run that was interrupted and
-    one that was not come to the same weights. The batch is divided over all local devices.
+    records: of `examples.prepared`. validation: frames with a reference. With a `state_file` that
+    exists, go on where it was written: with a limit of steps to the weights of a run that was never
+    interrupted. The batch is divided over all local devices.
 
     Raises `ValueError` if there is nothing to train on, or if the state is of another run.
     """
-    if not crops:
-        raise ValueError("crops is empty: no frame shows enough surface and light")
-    params = initial or flnr.init(jax.random.key(settings.seed), settings.widths)
-    solver, update = _solver(settings)
-    state = solver.init_state(params)
+    if not records:
+        raise ValueError("there are no frames to train on")
+    params = flnr.init(jax.random.key(settings.seed), settings.widths)
+    state, best = adam.start(params), params
     score = Validation(validation)
-    history = [Progress(0, float("nan"), score(params))]
-    best, top = params, history[0]
-    run = {"settings": repr(settings), "crops": len(crops)}
+    history = [Progress(0, 0.0, float("nan"), score(params))]
+    run = {"settings": repr(settings)}
     if state_file is not None and state_file.exists():
-        (params, state, best), saved = load_state(state_file, (params, state, best), run)
+        (state, best), saved = load_state(state_file, (state, best), run)
         history = [Progress(*entry) for entry in saved]
-        top = max(history, key=lambda entry: (np.nan_to_num(entry.validation), entry.step))
-    step, losses = int(state.iter_num), list[float]()
-    with Batches(crops, settings) as batches:
-        while not stop(step):
-            params, state = update(params, state, data=batches(step))
-            losses.append(float(state.value))
+    top = max(history, key=lambda entry: (np.nan_to_num(entry.score), entry.step))
+    step, losses, update = int(state.step), list[float](), _update()
+    began = time.monotonic() - history[-1].seconds
+    with Batches(records, settings) as batches:
+        while (done := max((time.monotonic() - began) / seconds, step / steps)) < 1:
+            rate = rate_at(step, done, settings)
+            state, value = update(state, batches(step), rate)
+            losses.append(float(value))
             step += 1
-            if step % settings.every == 0 or stop(step):
-                progress = Progress(step, float(np.mean(losses)), score(state.average))
+            over = time.monotonic() - began >= seconds or step >= steps
+            if step % settings.every == 0 or over:
+                spent = time.monotonic() - began
+                entry = Progress(step, spent, float(np.mean(losses)), score(state.average))
                 # Without validation frames nothing compares, and the last is the best.
-                if not progress.validation < top.validation:
-                    best, top = state.average, progress
-                history.append(progress)
+                if not entry.score < top.score:
+                    best, top = state.average, entry
+                history.append(entry)
                 losses.clear()
                 if state_file is not None:
-                    save_state(state_file, (params, state, best), history, run)
-                report(progress)
+                    save_state(state_file, (state, best), history, run)
+                report(entry)
     return Result(jax.tree.map(np.asarray, best), top, history)
 
 
+def rate_at(step: int, done: float, settings: Settings) -> np.float32:
+    """The size of a step. done: share of the run that lies behind it."""
+    falling = 0.5 + 0.5 * np.cos(np.pi * min(done, 1))
+    return np.float32(settings.rate * min(1, (step + 1) / WARM_UP) * falling + LEAST_RATE)
+
+
 @functools.cache
-def _solver(settings: Settings) -> tuple[Adam, Callable[..., Any]]:
-    """The solver and its step, compiled once for all runs with the same settings."""
-    solver = Adam(_batch_loss(settings), rate_of(settings))
-    return solver, jax.jit(solver.update)
+def _update() -> Callable[[Adam, Example, np.float32], tuple[Adam, jax.Array]]:
+    """A step, compiled once for all runs."""
 
+    def mean_loss(params: unet.Params, batch: Example) -> jax.Array:
+        return jnp.mean(jax.vmap(loss.relative_error, in_axes=(None, 0))(params, batch))
 
-def rate_of(settings: Settings) -> Callable[[jax.Array], jax.Array]:
-    """A slow start, then steps that shrink with the root of their number; no end is needed."""
-    return lambda t: settings.rate * jnp.minimum(1, (t + 1) / 100) / jnp.sqrt(1 + t / 2000)
+    def update(state: Adam, batch: Example, rate: Any) -> tuple[Adam, jax.Array]:
+        value, gradient = jax.value_and_grad(mean_loss)(state.params, batch)
+        return adam.update(state, gradient, rate), value
 
-
-def _batch_loss(settings: Settings) -> Callable[..., jax.Array]:
-    one = loss.to_noisy if settings.noisy_targets else loss.to_reference
-
-    def mean(params: unet.Params, data: Example) -> jax.Array:
-        return jnp.mean(jax.vmap(one, in_axes=(None, 0))(params, data))
-
-    return mean
+    return jax.jit(update)
 
 
 class Batches:
     """Batches by the number of the step, each drawn while the one before is worked on."""
 
-    def __init__(self, crops: Sequence[Crop], settings: Settings) -> None:
-        self.crops, self.settings = crops, settings
+    def __init__(self, records: Sequence[np.ndarray], settings: Settings) -> None:
+        self.records, self.settings = records, settings
         devices = jax.local_devices()
         if settings.batch % len(devices):
             raise ValueError(
@@ -155,33 +164,57 @@ class Batches:
 
     def __call__(self, step: int) -> Example:
         """The examples of this step, on the devices."""
-        draw = self.next.pop(step, None) or self.pool.submit(self._draw, step)
+        drawn = self.next.pop(step, None) or self.pool.submit(self._draw, step)
         self.next[step + 1] = self.pool.submit(self._draw, step + 1)
-        return jax.device_put(draw.result(), self.sharding)
+        return jax.device_put(drawn.result(), self.sharding)
 
     def _draw(self, step: int) -> Example:
         random = np.random.default_rng([self.settings.seed, step])
-        chosen = random.choice(len(self.crops), self.settings.batch)
-        return jax.tree.map(lambda *a: np.stack(a), *(draw(self.crops[i], random) for i in chosen))
+        chosen = random.choice(len(self.records), self.settings.batch)
+        drawn = (draw(self.records[i], random) for i in chosen)
+        return jax.tree.map(lambda *a: np.stack(a), *drawn)
+
+
+class Shown(NamedTuple):
+    """A frame of validation before the network: `Read`, and its picture's factor and target."""
+
+    spp: int
+    read: Read
+    factor: np.ndarray
+    target: np.ndarray
 
 
 class Validation:
     """Mean PSNR over frames with a reference, all before the network done once."""
 
-    def __init__(self, frames: Sequence[Frame]) -> None:
-        self.known = [(frame, prepared(frame)) for frame in frames]
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.frames = [shown for path in paths for shown in self._frames(path)]
 
-    def __call__(self, params: unet.Params) -> float:
-        """In dB, by the protocol of DESIGN.md; NaN without frames."""
-        scores = [self._one(params, frame, *known) for frame, known in self.known]
-        return float(np.mean(scores)) if scores else float("nan")
+    def __call__(self, params: unet.Params) -> dict[str, float]:
+        """In dB by samples per pixel, by the protocol of DESIGN.md."""
+        found: dict[str, list[float]] = {}
+        for spp, read, factor, target in self.frames:
+            picture = factor * np.asarray(_corrected(params, read), np.float64)
+            psnr = metrics.psnr(metrics.display(picture, 1), target)
+            found.setdefault(str(spp), []).append(psnr)
+        return {spp: float(np.mean(values)) for spp, values in found.items()}
 
-    def _one(self, params: unet.Params, frame: Frame, parts: Parts, known: Known) -> float:
-        light = np.asarray(_light(params, parts, known), np.float64)
-        albedo, reference = np.asarray(frame.albedo), np.asarray(frame.reference)
-        wanted = albedo * reference.astype(np.float64)
+    @staticmethod
+    def _frames(path: Path) -> list[Shown]:
+        frame, light = examples.layers(path)
+        albedo = np.asarray(frame.albedo, np.float64)
+        wanted = albedo * np.asarray(frame.reference)
         scale = metrics.exposure(wanted)
-        return metrics.psnr(metrics.display(albedo * light, scale), metrics.display(wanted, scale))
+        found = []
+        for spp in COUNTS:
+            if spp in light:
+                noisy = dataclasses.replace(frame, indirect=light[spp][0])
+                read, unit = before_network(noisy)
+                factor = albedo * (unit * scale)
+                found.append(Shown(spp, read, factor, metrics.display(wanted, scale)))
+        return found
 
 
-_light = jax.jit(loss.light)
+@jax.jit
+def _corrected(params: unet.Params, read: Read) -> jax.Array:
+    return read.light * flnr.gains(params, read)

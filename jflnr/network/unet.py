@@ -1,7 +1,7 @@
-"""A U-Net on blocks: pure functions over a plain pytree of arrays (section 3.3).
+"""A U-Net at half of the image's resolution: pure functions over a plain pytree of arrays.
 
-Two 3x3 convolutions per scale as in the paper, LeakyReLU, no batch normalisation. The first layer
-is 1x1: its input is a few finer blocks side by side, so that no convolution runs on fine grids.
+As in section 3.3 3 x 3 convolutions over several scales, LeakyReLU, no batch normalisation. The
+first layer is 1 x 1: 2 x 2 pixels lie side by side as channels. Skips are added.
 """
 
 from __future__ import annotations
@@ -14,24 +14,23 @@ from jflnr.lazy import jax, jnp, lax
 Params: TypeAlias = "dict[str, jax.Array]"
 
 
-def init(key: jax.Array, inputs: int, widths: Sequence[int], heads: Sequence[int]) -> Params:
+def init(key: jax.Array, inputs: int, means: int, widths: Sequence[int], outputs: int) -> Params:
     """Random weights (He et al. 2015), but zeros where the outputs come from.
 
-    inputs: channels read. widths: channels of each scale, fine to coarse. heads: channels to
-    give at each scale, 0 for none; the coarsest has none if there are fewer heads than scales.
+    inputs: channels read at every pixel; means: more at every scale. widths: channels of each
+    scale, fine to coarse. outputs: channels to give at every pixel.
     """
-    shapes = {"stem": (1, 1, inputs, widths[0])}
+    shapes = {"stem": (1, 1, 4 * inputs + means, widths[0])}
     for i, width in enumerate(widths):
-        shapes[f"encode{i}"] = (3, 3, width, width)
+        shapes[f"encode{i}"] = (3, 3, width + (means if i else 0), width)
         if i + 1 < len(widths):
             shapes[f"down{i}"] = (3, 3, width, widths[i + 1])
-            shapes[f"join{i}"] = (3, 3, width + widths[i + 1], width)
+            shapes[f"up{i}"] = (1, 1, widths[i + 1], width)
             shapes[f"decode{i}"] = (3, 3, width, width)
+    shapes["last"] = (3, 3, widths[0], widths[0])
     params = layers(key, shapes)
-    for i, outputs in enumerate(heads):
-        if outputs:
-            params[f"head{i}"] = jnp.zeros((1, 1, widths[i], outputs))
-            params[f"head{i}_bias"] = jnp.zeros(outputs)
+    params["head"] = jnp.zeros((1, 1, widths[0], 4 * outputs))
+    params["head_bias"] = jnp.zeros(4 * outputs)
     return params
 
 
@@ -46,25 +45,28 @@ def layers(key: jax.Array, shapes: Mapping[str, tuple[int, ...]]) -> Params:
     return params
 
 
-def apply(params: Params, x: jax.Array) -> list[jax.Array]:
-    """The outputs of every scale.
+def apply(params: Params, pixels: jax.Array, means: Sequence[jax.Array]) -> jax.Array:
+    """The outputs at every pixel, `(H, W, outputs)`.
 
-    x: `(h, w, inputs)`, any size. Returns `(ceil(h / 2^i), ceil(w / 2^i), heads[i])` for scale i.
+    pixels: `(H, W, inputs)`, H and W multiples of two to the number of scales. means: of every
+    scale, `(H / 2, W / 2, means)`, `(H / 4, W / 4, means)`, ...
     """
     scales = scales_of(params)
-    x = _layer(params, "stem", x)
+    x = _layer(params, "stem", jnp.concatenate([pack(pixels), means[0]], axis=-1))
     skips = []
     for i in range(scales):
-        x = _layer(params, f"encode{i}", x)  # (h / 2^i, w / 2^i, widths[i])
+        if i:
+            x = jnp.concatenate([x, means[i]], axis=-1)
+        x = _layer(params, f"encode{i}", x)  # (H / 2^(i+1), W / 2^(i+1), widths[i])
         skips.append(x)
         if i + 1 < scales:
-            x = _layer(params, f"down{i}", x, stride=2)  # (h / 2^(i+1), w / 2^(i+1), widths[i+1])
-    outputs = [_head(params, scales - 1, x)]
+            x = _layer(params, f"down{i}", x, stride=2)  # (H / 2^(i+2), W / 2^(i+2), widths[i+1])
     for i in reversed(range(scales - 1)):
-        x = jnp.concatenate([upsample(x, *skips[i].shape[:2]), skips[i]], axis=-1)
-        x = _layer(params, f"decode{i}", _layer(params, f"join{i}", x))
-        outputs.append(_head(params, i, x))
-    return outputs[::-1]
+        coarse = convolve(x, params[f"up{i}"], params[f"up{i}_bias"])
+        x = _leaky(upsample(coarse, *skips[i].shape[:2]) + skips[i])
+        x = _layer(params, f"decode{i}", x)
+    x = _layer(params, "last", x)
+    return unpack(convolve(x, params["head"], params["head_bias"]))
 
 
 def scales_of(params: Params) -> int:
@@ -73,15 +75,25 @@ def scales_of(params: Params) -> int:
 
 
 def reach_of(scales: int) -> int:
-    """How many values beyond its own an output of the finest scale depends on.
+    """How many pixels beyond its 2 x 2 an output depends on, beside what the means cover.
 
-    On every scale a convolution before the next one and two after it; one that leads there, and one
-    value for what is repeated.
+    On every scale a convolution after the next one and one before it; one that leads there, and one
+    value for what is repeated; on the finest one more.
     """
     reach = 1
     for _ in range(scales - 1):
-        reach = 1 + 1 + 2 * (reach + 1) + 2
-    return reach
+        reach = 1 + 1 + 2 * reach + 1 + 1
+    return 2 * (reach + 1)
+
+
+def multiply_adds(params: Params) -> float:
+    """Of all layers, per pixel of the image."""
+    total = 0.0
+    for name, kernel in params.items():
+        if kernel.ndim == 4:
+            scale = int(name[-1]) + name.startswith(("down", "up")) if name[-1].isdigit() else 0
+            total += kernel.size / 4 ** (scale + 1)
+    return total
 
 
 def convolve(x: jax.Array, kernel: jax.Array, bias: jax.Array, stride: int = 1) -> jax.Array:
@@ -101,27 +113,23 @@ def upsample(x: jax.Array, height: int, width: int) -> jax.Array:
     return jnp.repeat(jnp.repeat(x, 2, axis=0), 2, axis=1)[:height, :width]
 
 
-def pack(planes: jax.Array) -> jax.Array:
-    """2 x 2 blocks side by side as channels: `(C, h, w)` to `(ceil(h/2), ceil(w/2), 4 C)`."""
-    count, height, width = planes.shape
-    planes = jnp.pad(planes, ((0, 0), (0, height % 2), (0, width % 2)), mode="edge")
-    height, width = planes.shape[1] // 2, planes.shape[2] // 2
-    blocks = planes.reshape(count, height, 2, width, 2)
-    return blocks.transpose(1, 3, 0, 2, 4).reshape(height, width, 4 * count)
+def pack(image: jax.Array) -> jax.Array:
+    """2 x 2 pixels side by side as channels: `(2 h, 2 w, C)` to `(h, w, 4 C)`."""
+    height, width, count = image.shape
+    blocks = image.reshape(height // 2, 2, width // 2, 2, count)
+    return blocks.transpose(0, 2, 1, 3, 4).reshape(height // 2, width // 2, 4 * count)
 
 
-def unpack(x: jax.Array, height: int, width: int) -> jax.Array:
-    """The inverse of `pack`: `(h, w, 4 C)` to `(C, height, width)`."""
+def unpack(x: jax.Array) -> jax.Array:
+    """The inverse of `pack`."""
     h, w, count = x.shape
-    blocks = x.reshape(h, w, count // 4, 2, 2).transpose(2, 0, 3, 1, 4)
-    return blocks.reshape(count // 4, 2 * h, 2 * w)[:, :height, :width]
+    blocks = x.reshape(h, w, 2, 2, count // 4).transpose(0, 2, 1, 3, 4)
+    return blocks.reshape(2 * h, 2 * w, count // 4)
 
 
 def _layer(params: Params, name: str, x: jax.Array, stride: int = 1) -> jax.Array:
-    return jax.nn.leaky_relu(convolve(x, params[name], params[f"{name}_bias"], stride), 0.1)
+    return _leaky(convolve(x, params[name], params[f"{name}_bias"], stride))
 
 
-def _head(params: Params, scale: int, x: jax.Array) -> jax.Array:
-    if f"head{scale}" not in params:
-        return x[..., :0]
-    return convolve(x, params[f"head{scale}"], params[f"head{scale}_bias"])
+def _leaky(x: jax.Array) -> jax.Array:
+    return jax.nn.leaky_relu(x, 0.1)

@@ -17,7 +17,7 @@ import numpy as np
 from jflnr import arrays
 from jflnr.network import features, flnr, unet
 
-FORMAT, VERSION = "jflnr network", 2
+FORMAT, VERSION = "jflnr network", 3
 # More than any network here has; a file that says it unpacks to more is not read.
 LARGEST = 64 * 2**20
 WANTED = "a file of weights that `jflnr train` wrote"
@@ -30,8 +30,8 @@ def save(path: str | Path, params: unet.Params, widths: tuple[int, ...], **about
         "format": FORMAT,
         "version": VERSION,
         "widths": list(widths),
-        "guides": list(features.GUIDES),
-        "features": features.COUNT,
+        "guides": list(flnr.GUIDES),
+        "features": [features.PIXEL, features.POOLED],
         **about,
     }
     half = {name: np.asarray(value, np.float16) for name, value in params.items()}
@@ -62,7 +62,8 @@ def _widths(path: str | Path, header: dict[str, Any]) -> tuple[int, ...]:
     """Those of a header that this version reads."""
     if header.get("format") != FORMAT:
         raise ValueError(f"{path}: not {WANTED}")
-    known = {"version": VERSION, "features": features.COUNT, "guides": list(features.GUIDES)}
+    read = [features.PIXEL, features.POOLED]
+    known = {"version": VERSION, "features": read, "guides": list(flnr.GUIDES)}
     for name, wanted in known.items():
         if header.get(name) != wanted:
             raise ValueError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,10 +21,11 @@ from jflnr.opencl.context import Context, default_context, is_device_array
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
 from jflnr.opencl.grids import Grid, Run
-from jflnr.opencl.level import Alike, Level, Steer, fit_level
+from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.pyramid import halve, halve_planes
+from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
 from jflnr.regression.arguments import channel_count, check_regression
@@ -77,7 +77,7 @@ def flr_adaptive(
     images = context.array(pixels), to_layers(context, guides)
     counts = to_weight(context, weight)
     image = context.empty(target.shape) if method.keep_energy else output
-    _denoise(context, *images, counts, method, image)
+    write_light(context, *images, counts, method, image)
     if method.keep_energy:
         rescale(context, image, images[0], counts, output)
     if unit != 1:
@@ -102,15 +102,19 @@ def in_unit(target: Any) -> tuple[Any, np.float32]:
     return pixels / unit, unit
 
 
-def _denoise(
+def write_light(
     context: Context,
     target: Any,
     guides: tuple[Any, ...],
     weight: Any | None,
     method: AdaptiveFLR,
     image: Any,
-) -> None:
-    """The three passes over the pixels, and what happens on blocks between them; writes `image`."""
+    error: Any | None = None,
+) -> Run:
+    """The three passes over the pixels, and what happens on blocks between them.
+
+    Writes `image`, `(H, W, C)`, and, if it is given, the standard error to `error`, `(H, W, 1)`.
+    """
     block = method.finest
     count, channels, w = channel_count(guides), target.shape[2], -(-target.shape[1] // (2 * block))
     shift = centre(context, guides)
@@ -119,10 +123,13 @@ def _denoise(
     run = Run(context, count, channels, numbers_of(method), shift, mean)
     pilot = fit_pilot(run, moments, w, block)
     grid = collect_weighted(run, target, guides, pilot, weight, block)
-    _, merged = fit_levels(run, grid, block, method.levels)
+    steps, merged = fit_levels(run, grid, block, method.levels)
     scale, own = restore(run, merged, moments, w), own_light(run, merged, grid)
     restored = Restored(*scale, own, run.numbers.floor)
     apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
+    if error is not None:
+        standard_error(run, steps, scale, own, block, error)
+    return run
 
 
 def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Grid:
@@ -139,28 +146,18 @@ def fit_levels(
     moments: Grid,
     block: int,
     levels: int,
-    steers: Sequence[Steer] | None = None,
 ) -> tuple[list[Step], Grid]:
     """The steps from the coarsest grid to the finest, and the models put together from all levels.
 
-    block: side of the finest blocks. steers: what a network makes of the windows of every grid,
-    from the finest to the coarsest.
+    block: side of the finest blocks.
     """
     grids = [moments]
     for _ in range(levels - 1):
         grids.append(halve(run, grids[-1]))
-    steers = [Alike] * levels if steers is None else steers
-    coarse = fit_level(run, grids[-1], block << (levels - 1), steer=steers[-1])
+    coarse = fit_level(run, grids[-1], block << (levels - 1))
     steps, merged = list[Step](), coarse.models
     for level in reversed(range(levels - 1)):
-        fine = fit_level(
-            run,
-            grids[level],
-            block << level,
-            merged,
-            slopes=level > 0,
-            steer=steers[level],
-        )
+        fine = fit_level(run, grids[level], block << level, merged, slopes=level > 0)
         steps.append(Step(fine, coarse, signal_share(run, fine, coarse)))
         merged = merge(run, fine.models, coarse.models, merged, steps[-1].share)
         coarse = fine

@@ -40,8 +40,17 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
     return rate, output
 
 
-def rescale(context: Context, image: Any, target: Any, weight: Any | None, output: Any) -> None:
+def rescale(
+    context: Context,
+    image: Any,
+    target: Any,
+    weight: Any | None,
+    output: Any,
+    slack: float = 0.0,
+) -> None:
     """Scale the result so that its brightness sums to the input's over the pixels that count.
+
+    slack: share by which it may differ.
 
     image: `(H, W, C)` float32. target: `(H, W, C)`. weight: `(H, W)` or None. output: `(H, W, C)`,
     float32 or float16, is written; it may be `image`.
@@ -54,6 +63,6 @@ def rescale(context: Context, image: Any, target: Any, weight: Any | None, outpu
         defines["HALF_OUTPUT"] = 1
     arguments = (width, height, target, image, weight, partial)
     context.run("energy_rows", "rescale.cl", defines, (height,), arguments)
-    context.run("energy_ratio", "rescale.cl", defines, (1,), (height, partial, ratio))
+    context.run("energy_ratio", "rescale.cl", defines, (1,), (height, slack, partial, ratio))
     strips = -(-image.size // defines["WIDTH"])
     context.run("rescale", "rescale.cl", defines, (strips,), (image.size, ratio, image, output))

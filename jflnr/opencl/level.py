@@ -5,7 +5,6 @@ Its twin in JAX is jflnr/regression/level.py.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from jflnr.opencl.grids import Grid, Run
@@ -13,40 +12,28 @@ from jflnr.regression.moments import plane_count
 from jflnr.regression.solve import ROUNDING_OF_STRIPS as ROUNDING
 
 
-class Alike(NamedTuple):
-    """What decides the windows of a level.
-
-    grid: planes, of which the first `number` must be alike in a window; if `wider`, the next is a
-    factor on its width.
-    """
-
-    grid: Grid
-    number: int
-    wider: bool = False
-
-    def defines(self) -> dict[str, int]:
-        """Those of kernels_cl/window.h."""
-        planes = self.grid.number
-        return {"FEATURES": self.number, "FEATURE_PLANES": planes, "WIDER": int(self.wider)}
-
-
 class Level(NamedTuple):
     """One level and its fit.
 
     moments: K planes, weighted, and one of noise. features: the scaled mean guides of each block
     and, where there is a coarser level, a measure of the brightness found there, and that
-    brightness itself. alike: these or, with a network, what it makes of them. models: see
+    brightness itself. alike: how many of them must be alike in a window. models: see
     kernels_cl/models.h.
     """
 
     moments: Grid
     features: Grid
-    alike: Alike
+    alike: int
     models: Grid
 
+    def defines(self) -> dict[str, int]:
+        """Those of kernels_cl/window.h."""
+        return window_defines(self.features, self.alike)
 
-# From the features of a level, of which so many must be alike, to what decides its windows.
-Steer = Callable[[Grid, int], Alike]
+
+def window_defines(features: Grid, alike: int) -> dict[str, int]:
+    """Those of kernels_cl/window.h."""
+    return {"FEATURES": alike, "FEATURE_PLANES": features.number}
 
 
 def fit_level(
@@ -56,20 +43,19 @@ def fit_level(
     found: Grid | None = None,
     *,
     slopes: bool = True,
-    steer: Steer = Alike,
 ) -> Level:
     """Fit the models of one level.
 
     moments: K planes, and one of noise if they are weighted. side: of a block in pixels. found:
     models that the coarser levels found. slopes: whether the position in the window is two more
-    guides. steer: what a network makes of the windows.
+    guides.
     """
     features = _features(run, moments, found)
-    alike = steer(features, run.guides + (found is not None))
-    options = alike.defines() | {"POSITIONS": int(slopes)}
+    alike = run.guides + (found is not None)
+    options = window_defines(features, alike) | {"POSITIONS": int(slopes)}
     options["NOISE"] = moments.number - plane_count(run.guides, run.channels)
-    rows = _window_rows(run, moments, alike.grid, options)
-    return Level(moments, features, alike, _fit(run, rows, side, alike.grid, options))
+    rows = _window_rows(run, moments, features, options)
+    return Level(moments, features, alike, _fit(run, rows, side, features, options))
 
 
 def _features(run: Run, moments: Grid, found: Grid | None) -> Grid:

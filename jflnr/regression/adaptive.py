@@ -91,6 +91,11 @@ class AdaptiveFLR:
         """Pixels on a side of the finest blocks."""
         return max(self.block // 2, 1)
 
+    @property
+    def tells_error(self) -> bool:
+        """Whether the fits give the error of their models too."""
+        return self.with_error
+
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> AdaptiveFLR:
         same_size(frame, self.name)
         return self
@@ -101,7 +106,7 @@ class AdaptiveFLR:
 
     def stages(self) -> tuple[Stage, ...]:
         side = self.finest
-        models = [("models", side), ("output", 2 * side)] + [("error", side)] * self.with_error
+        models = [("models", side), ("output", 2 * side)] + [("error", side)] * self.tells_error
         return (
             *first_stages(side),
             Stage(
@@ -241,7 +246,7 @@ def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     grid = grid_of(parts["moments"], method.finest)
     levels = fit_steps(method, grid, known)
     given = merged_parts(*levels, parts["light"], grid, known)
-    if method.with_error:
+    if method.tells_error:
         given["error"] = block_error(*levels)
     return given
 
@@ -274,7 +279,7 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """Pass 3: the light of every pixel, `(H, W, C)`, and its error."""
     models = energy.scale(parts["models"], parts["output"], known["rate"])
     given = light_parts(method, models, parts, known)
-    if method.with_error:
+    if method.tells_error:
         own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
         # The floor is there for its root's derivative, and for pixels that see no light.
         error = jnp.sqrt(parts["error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
@@ -290,12 +295,16 @@ def light_parts(method: Any, models: jax.Array, parts: Parts, known: Known) -> P
     image = apply(models, guides, shift, method.finest, method.floor) * unit
     if not method.keep_energy:
         return {"image": image}
+    return {"image": image, "sums": before_and_after(image, parts, unit)}
+
+
+def before_and_after(image: jax.Array, parts: Parts, unit: jax.Array) -> jax.Array:
+    """Brightness of the pixels that count, noisy and denoised, over `unit`: `(2, H, W)`."""
     light = light_of(parts["target"])
     counts = jnp.isfinite(light)
     if parts["weight"] is not None:
         counts &= parts["weight"] > 0
-    both = jnp.stack([light / unit, light_of(image) / unit])
-    return {"image": image, "sums": jnp.where(counts, both, 0)}
+    return jnp.where(counts, jnp.stack([light / unit, light_of(image) / unit]), 0)
 
 
 def learn_kept(method: Any, known: Known, sums: Parts) -> Known:

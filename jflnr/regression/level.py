@@ -106,7 +106,6 @@ def windowed(
     numbers: AdaptiveFLR,
     *,
     slopes: bool = True,
-    wider: jax.Array | float = 1.0,
 ) -> Windowed:
     """The normal equations of one level.
 
@@ -114,11 +113,10 @@ def windowed(
     window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
 
     features: `(F, h, w)`, what must be alike in a window. mean: brightness of the whole frame.
-    slopes: whether the position in the window is a guide too. wider: `(h, w)`, factor on the width
-    of each block's window.
+    slopes: whether the position in the window is a guide too.
     """
     guides, positions = shift.size, 2 if slopes else 0
-    window = window_over(features, numbers.sigma * wider)
+    window = window_over(features, numbers.sigma)
     moments = (
         gather_moments(grid.moments, window, numbers.sigma, guides, channels)
         if slopes

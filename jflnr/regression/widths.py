@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from jflnr.lazy import jax, jnp
@@ -13,17 +13,6 @@ from jflnr.regression.pyramid import double
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
-
-
-class Said(NamedTuple):
-    """What a network says of the windows of one grid.
-
-    alike: `(E, h, w)`, added to what must be alike in a window, which is no more than E planes.
-    wider: `(h, w)`, factor on the width of each block's window.
-    """
-
-    alike: jax.Array
-    wider: jax.Array
 
 
 class Step(NamedTuple):
@@ -54,22 +43,17 @@ def fit_levels(
     levels: int,
     mean: jax.Array,
     numbers: AdaptiveFLR,
-    said: Sequence[Said] | None = None,
 ) -> tuple[Fit, list[Step]]:
-    """The fit of the coarsest grid, and the steps from there to the finest.
-
-    said: of every grid, from the finest to the coarsest; None without a network.
-    """
+    """The fit of the coarsest grid, and the steps from there to the finest."""
     grids = grid.pyramid(levels)
-    heard = list(said) if said is not None else [None] * levels
-    coarsest = _fit(grids[-1], heard[-1], True, shift, channels, mean, numbers)
+    coarsest = _fit(grids[-1], True, shift, channels, mean, numbers)
     last, steps = (coarsest, coarsest.coefficients), list[Step]()
-    for grid, own in zip(reversed(grids[:-1]), reversed(heard[:-1]), strict=True):
+    for grid in reversed(grids[:-1]):
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
         slopes = grid is not grids[0]
 
-        fit = functools.partial(_fit, grid, own, slopes, shift, channels, mean, numbers)
+        fit = functools.partial(_fit, grid, slopes, shift, channels, mean, numbers)
         steps.append(refine(grid, *last, shift.size, mean, numbers, fit))
         last = steps[-1].fine, steps[-1].merged
     return coarsest, steps
@@ -89,7 +73,6 @@ class Known(NamedTuple):
 
 def _fit(
     grid: Grid,
-    said: Said | None,
     slopes: bool,
     shift: jax.Array,
     channels: int,
@@ -99,8 +82,7 @@ def _fit(
 ) -> Fit:
     """The fit of one grid; `known` but of the coarsest."""
     features = guide_features(grid, shift.size, numbers) if known is None else known.features
-    features, wider = _with(said, features)
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes, wider=wider)
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
     return fit_level(system, shift.size, channels)
 
 
@@ -128,14 +110,6 @@ def refine(
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     merged = merged + share * (fine.coefficients - coarse.coefficients)
     return Step(grid, fine, coarse, level, share, merged)
-
-
-def _with(said: Said | None, features: jax.Array) -> tuple[jax.Array, jax.Array | float]:
-    """What must be alike, `(F, h, w)`, and the factor on the width."""
-    if said is None:
-        return features, 1.0
-    more = [(0, len(said.alike) - len(features)), (0, 0), (0, 0)]
-    return said.alike + jnp.pad(features, more), said.wider
 
 
 def guide_features(grid: Grid, guides: int, numbers: AdaptiveFLR) -> jax.Array:

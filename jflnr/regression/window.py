@@ -34,7 +34,7 @@ def window_over(features: jax.Array, sigma: jax.Array | float) -> Window:
     """The weights between blocks.
 
     features: `(F, h, w)`, scaled so that a distance of 1 is one standard deviation; with F = 0
-    this is the plain Gaussian. sigma: standard deviation in blocks, of all or `(h, w)`.
+    this is the plain Gaussian. sigma: standard deviation in blocks.
     """
     return Window(_line_weights(features, sigma, 2), _line_weights(features, sigma, 1))
 

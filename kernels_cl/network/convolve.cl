@@ -26,14 +26,14 @@ typedef float16 strided_t __attribute__((aligned(4)));
 
 #define INSIDE(i) ((x + (i)) < w ? 1 : 0)
 
-// from, to: maps, see maps.h; of `from_count` and `to_count` channels, of which `inputs` are read from
-// `from_first` on and `outputs` written from `to_first` on. The sizes h, w and pitch are those of `to`.
+// from, to: maps, see maps.h; of `inputs` and `to_count` channels, of which the first `outputs` are
+// written. The sizes h, w and pitch are those of `to`.
 // weights: (outputs / TOGETHER, SIDE, inputs, SIDE, TOGETHER), bias: (outputs), both with zeros up to
 // a multiple of TOGETHER. Global size ((pitch - MARGIN) / PIXELS, outputs / TOGETHER, h + 2).
 kernel void convolve(
-    int h, int w, int pitch, int from_pitch, int from_count, int from_first, int inputs,
-    int to_count, int to_first, int outputs, global const float *weights, global const float *bias,
-    global const float *from, global float *to)
+    int h, int w, int pitch, int from_pitch, int inputs, int to_count, int outputs,
+    global const float *weights, global const float *bias, global const float *from,
+    global float *to)
 {
     const int start = (int)get_global_id(0) * PIXELS, first = (int)get_global_id(1) * TOGETHER;
     const int y = (int)get_global_id(2) - 1;
@@ -48,8 +48,8 @@ kernel void convolve(
             for (int v = 0; v < VECTORS; ++v) sums[o * VECTORS + v] = bias[first + o];
         weights += (long)first * SIDE * SIDE * inputs;
         const int x = start * STRIDE - SIDE / 2, row = y * STRIDE - SIDE / 2;
-        from += MAP_AT(x, row, from_pitch, from_count, from_first);
-        for (int dy = 0; dy < SIDE; ++dy, from += (long)(from_count - inputs) * from_pitch)
+        from += MAP_AT(x, row, from_pitch, inputs, 0);
+        for (int dy = 0; dy < SIDE; ++dy)
             for (int i = 0; i < inputs; ++i, from += from_pitch) {
 #pragma unroll
                 for (int dx = 0; dx < SIDE; ++dx, weights += TOGETHER) {
@@ -66,7 +66,7 @@ kernel void convolve(
             }
     }
 
-    to += MAP_AT(start, y, pitch, to_count, to_first + first);
+    to += MAP_AT(start, y, pitch, to_count, first);
 #pragma unroll
     for (int o = 0; o < TOGETHER; ++o) {
         if (first + o < outputs) {

@@ -1,156 +1,120 @@
-// What the network reads (jflnr/network/features.py), in a map on blocks twice as large as the finest.
+// What the network reads of every pixel and of the means over 2 x 2 of them, in maps at half of the
+// resolution: 2 x 2 pixels side by side as channels (jflnr/network/features.py, unet.pack).
 //
-// Defines beside those of the headers: COUNT, the number of planes of moments; CHANNELS, those of the
-// map; MOST_SPREAD, above which a guide's variance is cut; LOG, if `spread` and `tent` give light as
-// log_light does.
+// Defines beside those of the headers: DARK; BRIGHTEST, above which no light is seen.
 
 #include "vectors.h"
 #include "sizes.h"
+#include "images.h"
+#include "products.h"
 #include "grids.h"
-#include "models.h"
 #include "network/maps.h"
-#include "network/logarithms.h"
-#include "network/step.h"
+#include "network/read.h"
 
-#ifdef LOG
-#define AS_READ(light) log_light(light, mean[0])
-#else
-#define AS_READ(light) (light)
-#endif
+#define PIXEL 15
 
-// Outputs of `of_step`, `tent` and `spread` lie in a grid or in a map: plane k of block (x, y) at
-//   start + y row + (x / GROUP) group + k plane + x % GROUP
-#define OUTPUT_PARAMETERS int start, int row, int group, int plane, global float *output
-#define OUTPUT (output + start + (long)y * row + (long)(x / GROUP) * group + x % GROUP)
-
-// OF_STEP planes of one level. level: a plane of `features`, of `feature_planes`, from features.cl.
-// Global size (pitch / WIDTH, h).
-kernel void of_step(
-    int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, int feature_planes,
-    global const float *mean, global const float *moments, global const float *features,
-    global const float *fine, global const float *coarse, global const float *share,
-    OUTPUT_PARAMETERS)
+#define OF_IMAGE(i) p[MIN(i, last) * stride + channel]
+INLINE real image_lanes(global const float *p, int stride, int channel, int last)
 {
-    const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
-    if (x >= pitch || y >= h) return;
-    const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
-    const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
-    real guides[Q + 1], values[OF_STEP];
-    mean_guides(moments + AT(x, y, pitch, COUNT), guides);
-    const real level = READ(features + AT(x, y, pitch, feature_planes) + (feature_planes - 1) * GROUP);
-    step_values(
-        guides, level, fine + AT(x, y, pitch, MODELS), &at, &share_at, mean[0], values);
-    for (int k = 0; k < OF_STEP; ++k) WRITE(values[k], OUTPUT + (long)k * plane);
+    return LANES(real, OF_IMAGE);
 }
 
-// Mean light under weights 1, 2, 1 along rows and columns, of a grid of moments; one plane.
-// Global size (pitch / WIDTH, h).
-#define NEIGHBOUR(i) (x + (i) + dx < 0 || x + (i) + dx >= pitch ? 0 : line[COLUMN(x + (i) + dx, COUNT)])
-kernel void tent(
-    int h, int pitch, global const float *mean, global const float *moments, OUTPUT_PARAMETERS)
+// The PIXEL values of WIDTH pixels from (x, y) on, and what is averaged of them; zeros beyond the image
+// and where a pixel does not count.
+INLINE void of_pixels(
+    int x, int y, int width, int height, float unit, global const target_t *target,
+    GUIDE_PARAMETERS, global const weight_t *weight, global const float *light,
+    global const float *error, real *values, real *means)
 {
-    const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
-    if (x >= pitch || y >= h) return;
-    real n = 0, light = 0;
-    for (int dy = -1; dy <= 1; ++dy) {
-        if (y + dy < 0 || y + dy >= h) continue;
-        for (int dx = -1; dx <= 1; ++dx) {
-            const float weight = (2 - dx * dx) * (2 - dy * dy) / 16.0f;
-            global const float *line = moments + AT(0, y + dy, pitch, COUNT);
-            n += weight * LANES(real, NEIGHBOUR);
-            line += XY(0, 0) * GROUP;
-            for (int c = 0; c < C; ++c, line += GROUP)
-                light += weight * BRIGHTNESS(c) * LANES(real, NEIGHBOUR);
+    const long pixel = (long)y * width + x;
+    const int last = MIN(width - x, WIDTH) - 1;
+    real denoised[3] = {0, 0, 0}, noisy[3] = {0, 0, 0}, guides[5] = {0, 0, 0, 0, 0}, wrong = 0;
+    mask counts = 0;
+    if (y < height && last >= 0) {
+        real all[C], known[Q];
+#pragma unroll
+        for (int c = 0; c < C; ++c) {
+            all[c] = target_lanes(target + pixel * C, C, c, 0, last);
+            noisy[c % 3] += all[c];
+            denoised[c % 3] += image_lanes(light + pixel * C, C, c, last);
         }
+#pragma unroll
+        for (int q = 0; q < Q; ++q) known[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, last);
+        counts = usable(weight, pixel, last, known, all) > 0;
+#pragma unroll
+        for (int q = 0; q < Q; ++q) {
+            const real cut = CLAMP(known[q], q < 3 ? -1 : 0, q == 3 ? 100 : 1);
+            guides[q] = counts ? cut : (real)0;
+        }
+        wrong = image_lanes(error + pixel, 1, 0, last);
     }
-    WRITE(AS_READ(light / MAX(n, 1e-9f)), OUTPUT);
-}
-
-// `count` planes of the grid half as fine, interpolated. Global size (pitch / WIDTH, h).
-kernel void spread(
-    int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, int count,
-    global const float *mean, global const float *coarse, OUTPUT_PARAMETERS)
-{
-    const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
-    if (x >= pitch || y >= h) return;
-    const coarse_t at = coarse_at(coarse, count, coarse_h, coarse_w, coarse_pitch, x, y);
-    for (int k = 0; k < count; ++k) WRITE(AS_READ(doubled(&at, k)), OUTPUT + (long)k * plane);
-}
-
-// Writes a plane of the finest blocks to four channels of the map, 2 x 2 blocks side by side; beyond
-// the border the last blocks are repeated.
-INLINE void pack(
-    real value, int k, int x, int y, int h, int w, int map_pitch, global float *map)
-{
-    for (int lower = y % 2; lower <= (y == h - 1 ? 1 : y % 2); ++lower) {
-        global float *even = map + MAP_AT(0, y / 2, map_pitch, CHANNELS, 4 * k + 2 * lower);
-        global float *odd = even + map_pitch;
-#if WIDTH == 1
-        (x % 2 ? odd : even)[x / 2] = value;
-#elif WIDTH == 4
-        *(global unaligned_pair *)(even + x / 2) = value.even;
-        *(global unaligned_pair *)(odd + x / 2) = value.odd;
-#else
-        *(global unaligned_float4 *)(even + x / 2) = value.even;
-        *(global unaligned_float4 *)(odd + x / 2) = value.odd;
+#if Q == 4
+    guides[4] = counts ? (real)1 : (real)0;
 #endif
-        if (w % 2 && x <= w - 1 && w - 1 < x + WIDTH) odd[w / 2] = even[w / 2];
+#define SHOWN(v) (counts ? CLAMP((v) * unit, 0, BRIGHTEST) : (real)0)
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+        means[c] = denoised[c] = SHOWN(denoised[c]);
+        means[3 + c] = noisy[c] = SHOWN(noisy[c]);
     }
+    wrong = SHOWN(wrong);
+    const real before = luminance(denoised), after = luminance(noisy), bright = before + 0.05f;
+    means[6] = MIN(after, 4 * before + 0.1f);
+    means[7] = (after - before) * (after - before);
+
+    values[0] = log(before + DARK);
+    values[1] = 0.5f * CLAMP((after - before) / bright, -1, 4);
+    values[2] = log(1 + (after + 0.05f) / bright);
+    values[3] = log(wrong / bright + 0.01f) + 1.5f;
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+        values[4 + c] = log((denoised[c] + DARK) / (before + DARK));
+        values[7 + c] = guides[c];
+    }
+    values[10] = log(guides[3] + 0.05f);
+    values[11] = 2 * guides[4] - 1;
+    values[12] = MIN(wrong, 3);
+    values[13] = counts ? (real)1 : (real)0;
+    values[14] = log(after + 0.03f);
 }
 
-// All that is read on the finest blocks: what they know before any fit, what the finest fit found, the
-// colours of the merged models. light: two planes, brightness and its logarithm.
-// Global size (pitch / WIDTH, h).
-kernel void finest(
-    int h, int w, int pitch, int coarse_h, int coarse_w, int coarse_pitch, int feature_planes,
-    int map_pitch, global const float *mean, global const float *moments,
-    global const float *features, global const float *fine, global const float *coarse,
-    global const float *share, global const float *merged, global float *light, global float *map)
+// light, error: (H, W, C) and (H, W) in float. mean: of the frame. map: 4 PIXEL + POOLED channels.
+// means: a map of MEANS channels. Both have h x w blocks of 2 x 2 pixels.
+// Global size ((pitch - MARGIN) / WIDTH, h).
+kernel void features(
+    int width, int height, int h, int w, int pitch, global const target_t *target,
+    GUIDE_PARAMETERS, global const weight_t *weight, global const float *light,
+    global const float *error, global const float *mean, global float *map, global float *means)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= w || y >= h) return;
-    const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
-    const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
-    moments += AT(x, y, pitch, COUNT);
-    merged += AT(x, y, pitch, MODELS);
-    real guides[Q + 1], values[OF_STEP], spreads[Q], colour[C];
-    const real n = READ(moments), inverse = mean_guides(moments, guides);
-
+    const float unit = 1 / mean[0];
+    real sums[MEANS];
 #pragma unroll
-    for (int q = 0; q < Q; ++q) {
-        const real square = READ(moments + XX(q + 1, q + 1) * GROUP) * inverse;
-        spreads[q] = MAX(square - guides[q + 1] * guides[q + 1], 0);
+    for (int k = 0; k < MEANS; ++k) sums[k] = 0;
+    map += MAP_AT(x, y, pitch, 4 * PIXEL + POOLED, 0);
+    for (int dy = 0; dy < 2; ++dy) {
+        real values[2][PIXEL], taken[2][MEANS];
+#pragma unroll
+        for (int half_of = 0; half_of < 2; ++half_of)
+            of_pixels(
+                2 * x + half_of * WIDTH, 2 * y + dy, width, height, unit, target, GUIDE_IMAGES,
+                weight, light, error, values[half_of], taken[half_of]);
+        global float *to = map + (long)dy * 2 * PIXEL * pitch;
+#pragma unroll
+        for (int k = 0; k < PIXEL; ++k) {
+            WRITE(EVEN(values[0][k], values[1][k]), to + (long)k * pitch);
+            WRITE(ODD(values[0][k], values[1][k]), to + (long)(PIXEL + k) * pitch);
+        }
+#pragma unroll
+        for (int k = 0; k < MEANS; ++k)
+            sums[k] += EVEN(taken[0][k], taken[1][k]) + ODD(taken[0][k], taken[1][k]);
     }
-    real own = 0;
+    means += MAP_AT(x, y, pitch, MEANS, 0);
 #pragma unroll
-    for (int c = 0; c < C; ++c) own += BRIGHTNESS(c) * READ(moments + XY(0, c) * GROUP);
-    const real noise = READ(moments + (COUNT - 1) * GROUP) + 1e-12f * mean[0] * mean[0];
-    const real varied = spreads[0] + spreads[1] + spreads[2];
-#define PACK(k, value) pack(value, k, x, y, h, w, map_pitch, map)
-    PACK(0, 4 * sqrt(MIN(varied, MOST_SPREAD) + 1e-4f));
-    PACK(1, 4 * sqrt(MIN(spreads[3], MOST_SPREAD) + 1e-4f));
-    PACK(2, 4 * sqrt(MIN(spreads[4], MOST_SPREAD) + 1e-4f));
-    PACK(3, log(n + 0.01f));
-    PACK(4, log_light(own * inverse, mean[0]));
-    PACK(5, log_light(sqrt(noise) * inverse, mean[0]));
-
-    const real level = READ(features + AT(x, y, pitch, feature_planes) + (feature_planes - 1) * GROUP);
-    step_values(
-        guides, level, fine + AT(x, y, pitch, MODELS), &at, &share_at, mean[0], values);
-#pragma unroll
-    for (int k = 0; k < OF_STEP; ++k) PACK(6 + k, values[k]);
-
-    real brightness = 0, positive = 0;
-#pragma unroll
-    for (int c = 0; c < C; ++c) {
-        colour[c] = 0;
-        for (int q = 0; q <= Q; ++q) colour[c] += guides[q] * READ(merged + (q * C + c) * GROUP);
-        brightness += BRIGHTNESS(c) * colour[c];
-        positive += BRIGHTNESS(c) * MAX(colour[c], 0);
+    for (int k = 0; k < MEANS; ++k) {
+        sums[k] *= 0.25f;
+        WRITE(sums[k], means + (long)k * pitch);
     }
-    const real logarithm = log_light(brightness, mean[0]);
-#pragma unroll
-    for (int c = 0; c < C; ++c) PACK(6 + OF_STEP + c, log_light(colour[c], mean[0]) - logarithm);
-    WRITE(positive, light + AT(x, y, pitch, 2));
-    WRITE(logarithm, light + AT(x, y, pitch, 2) + GROUP);
+    write_means(sums, 0.25f, pitch, map + 4L * PIXEL * pitch);
 }

@@ -135,7 +135,7 @@ def test_an_interruption_ends_it(tmp_path: Path, where: str) -> None:
         "fit a.exr -o a.exr --overwrite",
         "train --data a.exr -o a.exr --overwrite",
         "train --data b.exr --val a.exr -o a.exr --overwrite",
-        "train --data a.exr -o w.npz --finetune w.npz --overwrite",
+        "train --data a.exr -o a.exr --overwrite",
         "denoise a.exr -o out --temporal --history a.exr",
         "denoise a.exr -o out --temporal --history out/a.exr",
         "denoise a.exr -o p.exr --params p.exr --overwrite",

@@ -21,7 +21,7 @@ WORDS = st.sampled_from(
     "denoise info metrics fit devices -o --output --spp --method --backend --guides --params "
     "--sigma --eps --eps-prime --block --png --reference --overwrite --json --steps --help "
     "--temporal --history --explain --error-map --direct --map --memory --channels --profile "
-    "--version -- - -1 0 1 8 nan inf 1e400 1M flr flr-adaptive flnr flnr-small flnr-tiny bmfr auto "
+    "--version -- - -1 0 1 8 nan inf 1e400 1M flr flr-adaptive flnr flnr-small bmfr auto "
     "jax opencl normal,depth colour depth=Z all , frame.exr junk.exr empty.exr params.json "
     "nowhere/out.exr folder . ..".split()
 )

@@ -31,7 +31,7 @@ WRONG = st.tuples(
 OPTIONS = st.fixed_dictionaries(
     {},
     optional={
-        "method": st.sampled_from(["flr", "flnr-tiny", "bmfr", "auto", "", None, 3]),
+        "method": st.sampled_from(["flr", "flnr-small", "bmfr", "auto", "", None, 3]),
         "guides": st.sampled_from([(), ("normal",), ("depth", "depth"), ("colour",)]),
         "sigma": st.sampled_from([{}, 1.0, bmfr.PAPER, (0.0, 0.0, 0.0)]),
     },

@@ -84,7 +84,6 @@ def test_options_of_flr_hold_in_strips(rng):
         ("flr-adaptive", 70, 3584),
         ("flnr", 45, 3001),
         pytest.param("flnr-small", 83, 2710, marks=pytest.mark.slow),
-        pytest.param("flnr-tiny", 61, 2999, marks=pytest.mark.slow),
     ],
 )
 def test_adaptive_flr_and_flnr_in_tiles_are_themselves(rng, method, height, width):

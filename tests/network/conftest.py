@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jflnr import exr
 from jflnr.frame import Frame, write_frame
-from jflnr.network.examples import Crop, Example, draw, read
+from jflnr.network.examples import prepared
 from jflnr.network.flnr import init
 
 if TYPE_CHECKING:
@@ -52,32 +52,32 @@ def params() -> dict[str, jax.Array]:
 
 
 @pytest.fixture
-def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of two frames as training reads them, of one small crop each."""
-    monkeypatch.setattr("jflnr.network.examples.HEIGHT", 32)
-    monkeypatch.setattr("jflnr.network.examples.WIDTH", 64)
-    for number in (1, 2):
-        made = scene_of(32, 64)
-        frame = Frame(
-            indirect=number * made.target,
-            albedo=np.full((32, 64, 3), 0.5, np.float32),
-            normal=made.guides[..., :3],
-            depth=made.guides[..., 3:4],
-            ao=made.guides[..., 4:],
-            reference=number * (made.target.mean() + 0 * made.target),
-        )
-        write_frame(tmp_path / f"scene{number}.exr", frame)
-    return tmp_path
+def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Two small frames as training reads them, with two noisy layers and a target."""
+    monkeypatch.setattr("jflnr.network.examples.CROP", 32)
+    made = scene_of(32, 48)
+    noisy = np.random.default_rng(1).permutation(made.target)
+    frame = Frame(
+        indirect=made.target,
+        albedo=np.full((32, 48, 3), 0.5, np.float32),
+        normal=made.guides[..., :3],
+        depth=made.guides[..., 3:4],
+        ao=made.guides[..., 4:],
+        reference=made.target.mean() + 0 * made.target,
+    )
+    paths = [tmp_path / f"scene{number}_100.exr" for number in (1, 2)]
+    for number, path in enumerate(paths, 1):
+        write_frame(path, frame)
+        channels = exr.read_channels(path)
+        more = {f"indirect_1_b.{c}": noisy[..., i] for i, c in enumerate("RGB")}
+        more |= {f"target.{c}": channels[f"reference.{c}"] * number for c in "RGB"}
+        exr.write_channels(path, channels | more)
+    return paths
 
 
 @pytest.fixture
-def crops(frames: Path) -> list[Crop]:
-    return [crop for some in read(sorted(frames.glob("*.exr")), 0) for crop in some]
-
-
-@pytest.fixture
-def example(crops: list[Crop]) -> Example:
-    return jax.tree.map(jnp.asarray, draw(crops[0], np.random.default_rng(0)))
+def records(frames: list[Path], tmp_path: Path) -> list[np.ndarray]:
+    return [prepared(path, tmp_path / "prepared") for path in frames]
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """Training: its optimiser, its examples, going on after an interruption, several devices."""
 
 import dataclasses
-import itertools
 import os
 import subprocess
 import sys
@@ -11,105 +10,132 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jflnr import denoise
-from jflnr.network import examples as reading
-from jflnr.network import loss, train
-from jflnr.network.adam import Adam
-from jflnr.network.augment import augment
+from jflnr import exr
+from jflnr.cli import main
+from jflnr.network import adam, examples, train, weights
 
 
 def test_adam_is_the_papers_algorithm():
-    """Algorithm 1 of Kingma and Ba in numpy, on a quadratic."""
-    curvature = np.array([1.0, 10.0, 0.1])
-    solver = Adam(lambda p, data: jnp.sum(data * p**2) / 2, lambda t: 0.1, clip=1e9)
-    params = jnp.ones(3)
-    state = solver.init_state(params)
+    """Algorithm 1 of Kingma and Ba in numpy, with decay of the weights, on a quadratic."""
+    curvature = np.array([0.1, 0.2, 0.05])
+    state = adam.start(jnp.ones(3))
     p, m, v = np.ones(3), 0, 0
     for t in range(1, 6):
-        params, state = solver.update(params, state, data=jnp.asarray(curvature))
         g = curvature * p
+        state = adam.update(state, jnp.asarray(curvature) * state.params, 0.1)
         m, v = 0.9 * m + 0.1 * g, 0.99 * v + 0.01 * g**2
-        p = p - 0.1 * (m / (1 - 0.9**t)) / (np.sqrt(v / (1 - 0.99**t)) + 1e-8)
-    np.testing.assert_allclose(params, p, rtol=1e-5)
-
-
-def test_adam_runs_over_an_iterator_as_jaxopts_solvers_do():
-    solver = Adam(lambda p, data: jnp.mean((p - data) ** 2), lambda t: 0.1, maxiter=200)
-    batches = iter(np.random.default_rng(0).normal(3, 0.1, (300, 8)).astype(np.float32))
-    params, state = solver.run_iterator(jnp.zeros(()), batches)
-    assert abs(float(params) - 3) < 0.1
-    assert abs(float(state.average) - 3) < 0.5
+        p = p - 0.1 * (m / (1 - 0.9**t) / (np.sqrt(v / (1 - 0.99**t)) + 1e-8) + 1e-4 * p)
+    np.testing.assert_allclose(state.params, p, rtol=1e-5)
 
 
 def test_a_step_whose_gradient_overflows_is_left_out():
-    solver = Adam(lambda p, data: data * p, lambda t: 0.1)
-    params = jnp.ones(())
-    state = solver.init_state(params)
-    moved, state = solver.update(params, state, data=jnp.asarray(jnp.inf))
-    assert float(moved) == 1
+    state = adam.update(adam.start(jnp.zeros(())), jnp.asarray(jnp.inf), 0.1)
+    assert float(state.params) == 0
 
 
-def test_augmented_frames_are_denoised_to_augmented_results(crops):
-    """Mirrored or recoloured first, or denoised first: the same."""
-    frame = dataclasses.replace(crops[0].frame, indirect=np.float32(crops[0].light[1][0]))
-    plain = np.asarray(denoise(frame, "flr-adaptive"))
-    images = (frame.indirect, frame.reference, plain)
-    variants = [
-        tuple(np.flip(image, axes)[..., list(order)] for image in images)
-        for axes in ((), (0,), (1,), (0, 1))
-        for order in itertools.permutations(range(3))
-    ]
-    found = set()
-    for seed in range(5):
-        changed = augment(frame, np.random.default_rng(seed))
-        number = next(i for i, v in enumerate(variants) if np.array_equal(v[0], changed.indirect))
-        np.testing.assert_array_equal(changed.reference, variants[number][1])
-        ours = denoise(changed, "flr-adaptive")
-        # The brightness by which channels are judged knows green from blue.
-        np.testing.assert_allclose(ours, variants[number][2], rtol=0.1, atol=0.1 * plain.max())
-        found.add(number)
-    assert len(found) > 1
+def test_steps_grow_and_then_fall():
+    settings = train.Settings()
+    rates = [train.rate_at(step, step / 10_000, settings) for step in (0, 199, 5000, 9999)]
+    assert rates[0] < 0.01 * settings.rate + train.LEAST_RATE
+    np.testing.assert_allclose(rates[1], settings.rate, rtol=0.02)
+    np.testing.assert_allclose(rates[2], settings.rate / 2, rtol=0.03)
+    np.testing.assert_allclose(rates[3], train.LEAST_RATE, rtol=0.01)
 
 
-def test_going_on_gives_the_same_weights(crops, settings, tmp_path):
-    whole = train.train(crops, [], settings, stop=lambda step: step >= 4)
+def test_a_record_holds_every_realisation(frames, records):
+    """Two streams of one sample: each, a mixture for each, and their mean of two samples."""
+    record = records[1]
+    assert record["spp"][0].tolist() == [1, 1, 1, 1, 2]
+    channels = exr.read_channels(frames[1])
+    layers = (np.stack([channels[f"{n}.{c}"] for c in "RGB"], -1) for n in ("indirect_1", "target"))
+    noisy, target = (np.float32(layer) for layer in layers)
+    ratio = record["noisy"][0, 0] * record["exposure"][0, 0] / record["target"][0]
+    np.testing.assert_allclose(ratio, noisy / target, rtol=5e-3)
+    np.testing.assert_allclose(np.mean(0.5 * record["target"][0], dtype=float), 0.35, rtol=1e-3)
+    mixture = record["noisy"][0, 2]
+    from_first, from_second = (mixture == record["noisy"][0, i] for i in (0, 1))
+    assert 0.3 < np.mean(from_first.all(-1)) < 0.7 and (from_first | from_second).all()
+
+
+def test_prepared_frames_are_made_once(frames, records, tmp_path, monkeypatch):
+    monkeypatch.setattr(examples, "_record", None)
+    again = examples.prepared(frames[0], tmp_path / "prepared")
+    np.testing.assert_array_equal(again["light"], records[0]["light"])
+
+
+def test_crops_are_the_record_mirrored_and_recoloured(records):
+    """What belongs together stays together: the noisy light and the denoised one of a pixel."""
+    record = records[0]
+    seen = set()
+    for seed in range(8):
+        example = examples.draw(record, np.random.default_rng(seed))
+        read = example.read
+        assert read.light.shape == (32, 32, 3) and read.mask.all()
+        np.testing.assert_allclose(np.linalg.norm(read.normal, axis=-1), 1, rtol=2e-3)
+        tint = example.target.mean((0, 1))
+        found = np.sort(read.noisy.mean((0, 1)) / tint * tint.mean())
+        seen.add(tuple(np.round(found, 4)))
+        assert np.isfinite(jax.tree.leaves(example)[0]).all()
+    assert len(seen) > 4
+
+
+def test_training_lowers_the_loss(records, settings):
+    settings = dataclasses.replace(settings, every=20)
+    history = train.train(records, [], settings, steps=60).history
+    assert history[-1].loss < 0.8 * history[1].loss
+
+
+def test_going_on_gives_the_same_weights(records, settings, tmp_path, monkeypatch):
+    whole = train.train(records, [], settings, steps=4)
     state = tmp_path / "state"
-    train.train(crops, [], settings, state_file=state, stop=lambda step: step >= 2)
-    rest = train.train(crops, [], settings, state_file=state, stop=lambda step: step >= 4)
+
+    class Interrupted(Exception):
+        pass
+
+    def stop(entry):
+        raise Interrupted
+
+    with pytest.raises(Interrupted):
+        train.train(records, [], settings, steps=4, state_file=state, report=stop)
+    rest = train.train(records, [], settings, steps=4, state_file=state)
     for name, value in whole.params.items():
         np.testing.assert_array_equal(rest.params[name], value)
     assert [entry.step for entry in rest.history] == [0, 2, 4]
     other = dataclasses.replace(settings, seed=1)
     with pytest.raises(ValueError, match="another run"):
-        train.train(crops, [], other, state_file=state, stop=lambda step: True)
+        train.train(records, [], other, steps=4, state_file=state)
 
 
-def test_a_state_that_is_none_is_refused(crops, settings, tmp_path):
+def test_a_state_that_is_none_is_refused(records, settings, tmp_path):
     (tmp_path / "state").write_bytes(b"no state")
     with pytest.raises(ValueError, match="not the state of a training run"):
-        train.train(crops, [], settings, state_file=tmp_path / "state", stop=lambda step: True)
+        train.train(records, [], settings, state_file=tmp_path / "state", steps=1)
 
 
-def test_noise_as_target_has_its_least_loss_at_the_mean(rng):
-    """The derivative of the loss with noisy targets vanishes, on average, at the true light."""
-    noise = jnp.asarray(rng.exponential(2.0, 200_000))
-    slope = jax.grad(lambda x: loss.relative(x * jnp.ones_like(noise), noise))
-    assert abs(float(slope(2.0))) < 0.02
-    assert float(slope(1.5)) < -0.1 and float(slope(2.5)) > 0.1
-
-
-def test_frames_that_cannot_be_trained_on(frames):
-    from jflnr.frame import read_frame, write_frame
-
-    path = frames / "scene1.exr"
-    frame = read_frame(path)
-    for change, sentence in (
-        ({"reference": None}, "reference or two"),
-        ({"ao": None}, "layer ao"),
-    ):
-        write_frame(path, dataclasses.replace(frame, **change))
+def test_frames_that_cannot_be_trained_on(frames, tmp_path):
+    channels = exr.read_channels(frames[0])
+    for gone, sentence in (("indirect", "no noisy layer"), ("reference|target", "layer reference")):
+        names = gone.split("|")
+        kept = {n: c for n, c in channels.items() if not n.startswith(tuple(names))}
+        exr.write_channels(frames[0], kept)
         with pytest.raises(ValueError, match=sentence):
-            list(reading.read([path], 0))
+            examples.prepared(frames[0], tmp_path / "prepared")
+
+
+def test_command(frames, tmp_path, capsys):
+    """It writes weights that say where they come from, keeps them, and goes on."""
+    out = tmp_path / "w.npz"
+    command = ["train", "--data", str(tmp_path), "--val", str(frames[0]), "-o", str(out)]
+    command += ["--size", "small", "--batch", "2", "--every", "1"]
+    assert main([*command, "--steps", "1"]) == 0
+    assert "dB at 1 spp" in capsys.readouterr().out
+    _, header = weights.load(out)
+    assert header["frames"] == 2 and header["scenes"] == 2 and header["widths"] == [10, 16, 24, 32]
+    assert main([*command, "--steps", "2"]) == 0
+    (tmp_path / "w.npz.state").unlink()
+    before = out.read_bytes()
+    assert main(command) == 0
+    assert "kept as it is" in capsys.readouterr().out and out.read_bytes() == before
 
 
 TWO_DEVICES = """
@@ -119,17 +145,17 @@ import numpy as np
 sys.path.insert(0, {root!r})
 from pathlib import Path
 from jflnr.network import examples, train
-examples.HEIGHT, examples.WIDTH = 32, 64
-found = [e for some in examples.read(sorted(Path({folder!r}).glob("*.exr")), 0) for e in some]
+examples.CROP = 32
+found = [np.load(path) for path in sorted(Path({folder!r}).glob("*.npy"))]
 settings = train.Settings(widths=(4, 4, 4), batch=2, every=1)
-result = train.train(found, [], settings, stop=lambda step: step >= 1)
+result = train.train(found, [], settings, steps=1)
 print(len(jax.local_devices()), result.history[-1].loss)
 """
 
 
-def test_two_devices_find_the_same_loss(frames, crops, settings):
-    one = train.train(crops, [], settings, stop=lambda step: step >= 1)
-    code = TWO_DEVICES.format(root=os.getcwd(), folder=str(frames))
+def test_two_devices_find_the_same_loss(records, settings, tmp_path):
+    one = train.train(records, [], settings, steps=1)
+    code = TWO_DEVICES.format(root=os.getcwd(), folder=str(tmp_path / "prepared"))
     flags = os.environ["XLA_FLAGS"] + " --xla_force_host_platform_device_count=2"
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import correlate
 
-from jflnr.network import unet
+from jflnr.network import flnr, unet
+from jflnr.network.features import Read
+from tests.oracle import network_numpy
 
 
 @pytest.mark.parametrize(("size", "stride"), [((5, 7), 1), ((6, 9), 2), ((1, 1), 2)])
@@ -19,27 +21,27 @@ def test_convolution_is_scipys(rng, size, stride):
     np.testing.assert_allclose(ours, np.stack(maps, -1) + bias, atol=1e-5)
 
 
-@pytest.mark.parametrize("size", [(8, 12), (7, 5), (1, 1)])
-def test_every_scale_gives_its_outputs_on_any_size(rng, size):
-    params = unet.init(jax.random.key(0), 6, (3, 4, 5), (7, 2))
-    x = jnp.asarray(rng.standard_normal((*size, 6)), jnp.float32)
-    first, second, third = unet.apply(params, x)
-    assert first.shape == (*size, 7)
-    assert second.shape == (-(-size[0] // 2), -(-size[1] // 2), 2)
-    assert third.shape[-1] == 0
-    assert not first.any() and not second.any()
+@pytest.mark.parametrize("size", [(16, 24), (13, 19)])
+def test_gains_are_those_of_plain_numpy(rng, params, size):
+    light, noisy = rng.exponential(size=(2, *size, 3))
+    error, depth, ao = rng.random((3, *size))
+    mask = np.float64(rng.random(size) > 0.1)
+    light, noisy = light * mask[..., None], noisy * mask[..., None]
+    normal = rng.standard_normal((*size, 3))
+    images = light, noisy, error, normal, depth, ao, mask
+    with jax.enable_x64(True):
+        read = Read(*(jnp.asarray(image.reshape(*size, -1)) for image in images))
+        ours = jax.jit(flnr.gains)({n: jnp.float64(v) for n, v in params.items()}, read)
+    np.testing.assert_allclose(ours, network_numpy.gains(params, *images), rtol=1e-9)
 
 
-def test_the_output_sees_far(rng):
-    """A change in one corner reaches blocks that one convolution does not."""
-    params = unet.init(jax.random.key(0), 2, (4, 4, 4), (3,))
-    params["head0"] = jnp.ones_like(params["head0"])
-    x = jnp.asarray(rng.standard_normal((16, 16, 2)), jnp.float32)
-    change = unet.apply(params, x.at[0, 0].add(1))[0] - unet.apply(params, x)[0]
-    assert jnp.abs(change[8, 8]).max() > 0
+def test_multiply_adds_are_those_of_the_layers():
+    params = unet.init(jax.random.key(0), 2, 1, (3, 5), 3)
+    half = (8 + 1) * 3 + 9 * 3 * 3 + 9 * 3 * 3 + 9 * 3 * 3 + 3 * 12
+    quarter = 9 * 3 * 5 + 9 * (5 + 1) * 5 + 5 * 3
+    assert unet.multiply_adds(params) == half / 4 + quarter / 16
 
 
-@pytest.mark.parametrize("size", [(4, 6), (5, 3)])
-def test_unpacking_undoes_packing(rng, size):
-    planes = jnp.asarray(rng.standard_normal((3, *size)))
-    np.testing.assert_array_equal(unet.unpack(unet.pack(planes), *size), planes)
+def test_unpacking_undoes_packing(rng):
+    image = jnp.asarray(rng.standard_normal((4, 6, 3)))
+    np.testing.assert_array_equal(unet.unpack(unet.pack(image)), image)

@@ -21,7 +21,7 @@ ADAPTIVE = 1e-3
 # BMFR, fed the same noise: what features that nearly depend on each other do to a fit of few
 # pixels, handed on over a sequence.
 BMFR = 1e-3
-# The network's layers: sums of up to 9 x 17 products of either sign, five in a row.
+# A layer of the network: sums of up to 9 x 4 products of either sign.
 NETWORK = 5e-6
-# What it reads: logarithms, which turn a relative error of the adaptive fits into an absolute one.
-FEATURES = 2e-3
+# All of it, with the logarithms that it reads, against JAX in float32.
+NETWORK_WHOLE = 2e-5

@@ -65,7 +65,7 @@ def test_flr_adaptive(case):
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
 @pytest.mark.parametrize("case", FIVE_GUIDES)
 def test_flnr(case):
-    is_finite(flnr, case, FLNR(params=shipped("flnr-tiny")), np.array([0, 0, 0]))
+    is_finite(flnr, case, FLNR(params=shipped("flnr-small")), np.array([0, 0, 0]))
 
 
 @pytest.mark.parametrize(

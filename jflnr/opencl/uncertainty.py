@@ -1,0 +1,44 @@
+"""Host side of kernels_cl/error.cl; its twin in JAX is jflnr/regression/uncertainty.py."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from jflnr.opencl.apply import apply
+from jflnr.opencl.grids import Grid, Run
+from jflnr.regression.uncertainty import DETAIL, LEFT_OUT, VARIANCE
+
+if TYPE_CHECKING:
+    from jflnr.opencl.adaptive import Step
+
+
+def standard_error(
+    run: Run, steps: Sequence[Step], scale: tuple[Any, Any], own: Grid, step: int, output: Any
+) -> None:
+    """Write the standard error of the brightness of every pixel to `output`, `(H, W, 1)`.
+
+    steps: coarse to fine. scale: from `energy.restore`. own: from `floor.own_light`. step: side of
+    the finest blocks in pixels.
+    """
+    before: Grid | None = None
+    for fine, coarse, share in steps:
+        h, w, pitch = fine.models.sizes
+        after = run.grid(2, h, w)
+        arguments = (
+            h, pitch, *coarse.models.sizes, fine.moments.planes, fine.models.planes,
+            coarse.models.planes, share.planes, None if before is None else before.planes,
+            after.planes,
+        )  # fmt: skip
+        defines = {"COUNT": fine.moments.number} | ({"FIRST": 1} if before is None else {})
+        run.launch("error_step", "error.cl", after, arguments, **defines)
+        before = after
+    assert before is not None
+    (h, w, pitch), (rate, brightness) = before.sizes, scale
+    error = run.context.empty((1, 1, h, pitch))
+    of_grid = (
+        h, pitch, brightness.shape[1], VARIANCE, LEFT_OUT, DETAIL, run.mean, rate, brightness,
+        own.planes, before.planes, error,
+    )  # fmt: skip
+    run.launch("standard_error", "error.cl", before, of_grid, COUNT=0)
+    apply(run.context, error, (), run.shift, step, (h, w, pitch), output)
