@@ -70,8 +70,6 @@ def read(path: Path) -> Picture:
     layers["position"] = np.where(there, (layers["position"] - middle) / unit, 0)
     if np.all(layers["alpha"] == 1):
         del layers["alpha"]
-    else:  # a transparent film does not show it
-        del layers["environment"]
     return Picture(**layers)
 
 

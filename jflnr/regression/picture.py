@@ -1,8 +1,9 @@
 """A whole picture, with all its materials, denoised by one regression.
 
 What reflects or transmits is `light = (beauty - emission - environment) / albedo`; the albedo
-follows mirrors and glass, as a path tracer's denoising albedo does. Emission and environment know
-no noise but that of their edges, and are filtered as features are.
+follows mirrors and glass, as a path tracer's denoising albedo does, and beyond white shows the
+lamps that are seen in them. Emission and environment know no noise but that of their edges, and are
+filtered as features are.
 """
 
 from __future__ import annotations
@@ -14,26 +15,33 @@ import jax.numpy as jnp
 from jax import lax
 
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
-from jflnr.regression.features import antialiased, filter_features
+from jflnr.regression.features import antialiased, coverage, filter_features
 
 # Side in pixels of the blocks of the first pass, with 2 samples per pixel and more; with one, 4.
 BLOCK = 2
 # Darker surfaces are not divided by their albedo, which is hardly known.
 LEAST_ALBEDO = 0.02
 # Of what covers less of a pixel too little is known to learn from it.
-LEAST_ALPHA = 0.1
+LEAST_ALPHA = 0.02
+# Layers in half precision are added up that exactly, relative to them.
+ROUNDING = 2e-3
 # A pixel so many times brighter than those around weighs as little as if it were no brighter.
 FIREFLY, AROUND = 20, 3
+
+GUIDES = "normal", "albedo", "seen_normal", "depth", "position"
+# Depth and position of the pixels' centres are aliased, and would break thin lines.
+STEERING = "albedo", "normal", "seen_normal", "emission", "environment", "alpha"
 
 
 class Picture(NamedTuple):
     """What a renderer tells of a picture, `(H, W, C)` each; None where it does not.
 
-    beauty: the noisy picture. albedo: of the light that is seen, also through mirrors and glass.
-    normal: unit. seen_normal: of what is seen in mirrors and through glass. depth: over its median.
-    position: about a point of the scene, over the median depth. emission: seen directly.
-    environment: seen directly; None on a transparent film, whose beauty does not hold it. alpha:
-    share of the pixel that is covered.
+    beauty: the noisy picture. albedo: of the light that is seen, also through mirrors and glass;
+    with emission and environment added everywhere, as Cycles does, or nowhere. normal: unit.
+    seen_normal: of what is seen in mirrors and through glass. depth: over its median. position:
+    about a point of the scene, over the median depth. emission: seen directly. environment: seen
+    directly. alpha: share of the pixel that is covered, on a transparent film, whose beauty does
+    not hold the environment, and whose other layers hold 0 beyond.
     """
 
     beauty: jax.Array
@@ -65,30 +73,44 @@ def denoise_picture(
     if filtered is None:
         noisy = antialiased(picture.normal)
         clean = jax.tree.map(lambda new, old: jnp.where(noisy, new, old), clean, picture)
-    surface = jnp.clip(clean.albedo, LEAST_ALBEDO, 1)
-    opaque = jnp.ones(surface.shape[:2], bool)
-    if clean.alpha is not None:
-        surface, opaque = surface * jnp.clip(clean.alpha, 0, 1), clean.alpha[..., 0] > LEAST_ALPHA
+    covered = jnp.ones((1,) * 3) if clean.alpha is None else jnp.clip(clean.alpha, 0, 1)
+    surface = jnp.maximum(reflecting(clean, holds_light(picture)), LEAST_ALBEDO * covered)
     light = jnp.maximum(picture.beauty - own_light(picture), 0) / jnp.maximum(surface, 1e-6)
-    weight = firefly_weight(light_of(light)) * opaque
-    layers = (clean.normal, clean.albedo, clean.seen_normal, clean.depth, clean.position)
+    weight = firefly_weight(light_of(light)) * (covered > LEAST_ALPHA)[..., 0]
+    guiding = clean._replace(albedo=jnp.clip(clean.albedo, 0, 1))
+    layers = [getattr(guiding, name) for name in GUIDES]
     guides = tuple(layer for layer in layers if layer is not None)
     fitted = flr_adaptive(light, guides, method, block=block, weight=weight)
     return clean._replace(beauty=jnp.maximum(fitted, 0) * surface + own_light(clean))
 
 
 def own_light(picture: Picture) -> jax.Array:
-    """Emission and environment, `(H, W, 3)`: what no surface reflects."""
-    parts = (picture.emission, picture.environment)
+    """What no surface reflects and beauty holds, `(H, W, 3)`: emission, and what is behind all."""
+    behind = None if picture.alpha is not None else picture.environment
+    return _sum(picture, picture.emission, behind)
+
+
+def holds_light(picture: Picture) -> jax.Array:
+    """Whether the albedo has emission and environment added to it, `()`."""
+    own = _sum(picture, picture.emission, picture.environment)
+    return jnp.all(~(picture.albedo < (1 - ROUNDING) * own - ROUNDING))
+
+
+def reflecting(picture: Picture, lit: jax.Array) -> jax.Array:
+    """The albedo of what reflects alone, `(H, W, 3)`. lit: as of `holds_light`."""
+    own = _sum(picture, picture.emission, picture.environment)
+    return jnp.maximum(picture.albedo - jnp.where(lit, own, 0), 0)
+
+
+def _sum(picture: Picture, *parts: jax.Array | None) -> jax.Array:
     return sum((part for part in parts if part is not None), jnp.zeros_like(picture.beauty))
 
 
 def filter_picture(picture: Picture) -> Picture:
-    """Every layer but the beauty without its noise; the albedo cut to 1."""
-    picture = picture._replace(albedo=jnp.clip(picture.albedo, 0, 1))
+    """Every layer but the beauty without its noise."""
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
-    unit = jnp.nanmean(layers.pop("beauty"))
-    steering = [steer(name, layer, unit) for name, layer in layers.items()]
+    unit = jnp.maximum(jnp.nanmean(layers.pop("beauty")), 1e-12)
+    steering = [steer(name, layer, unit) for name, layer in layers.items() if name in STEERING]
     filtered = filter_features(steering, list(layers.values()))
     return picture._replace(**dict(zip(layers, filtered, strict=True)))
 
@@ -96,9 +118,10 @@ def filter_picture(picture: Picture) -> Picture:
 def steer(name: str, layer: jax.Array, unit: jax.Array) -> jax.Array:
     """A layer so scaled that it varies by about 1. unit: brightness of the picture, `()`."""
     if name in ("emission", "environment"):
-        light = jnp.mean(layer, axis=-1, keepdims=True)
-        return light / (jnp.abs(light) + jnp.maximum(unit, 1e-12))
-    return layer if name in ("albedo", "alpha") else layer / 2
+        return coverage(jnp.mean(layer, axis=-1, keepdims=True), unit)
+    if name == "albedo":
+        return coverage(layer, 1.0)
+    return layer if name == "alpha" else layer / 2
 
 
 def firefly_weight(light: jax.Array) -> jax.Array:
