@@ -87,7 +87,7 @@ def test_a_transparent_film_stays_empty_and_alpha_gets_smoother(rng):
     behind = {name: np.float32(getattr(picture, name) * share) for name in ("beauty", "albedo")}
     picture = picture._replace(alpha=np.float32(share), **behind)
     result = denoised(picture, filtered=True)
-    assert np.all(result.beauty[:3] == 0)
+    assert np.all(result.beauty[:2] == 0)  # beyond the window
     y, x = np.mgrid[:HEIGHT, :WIDTH][..., None] + rng.random((2, HEIGHT, WIDTH, 2000))
     exact = np.mean((x - 17) ** 2 + (y - 13) ** 2 < 60, axis=-1, keepdims=True)
     assert np.mean((result.alpha - exact) ** 2) < np.mean((share - exact) ** 2)
