@@ -46,7 +46,10 @@ def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
 
     image = np.asarray(given["image"], np.float32)
     if method.name == WHOLE:
-        shining = sum(own for own in (frame.emitted, frame.environment) if own is not None)
+        shining = 0 if frame.emitted is None else frame.emitted
+        if frame.environment is not None:
+            seen = 1 if frame.alpha is None else frame.alpha == 1
+            shining = shining + seen * frame.environment
         picture, alpha = image[..., :3], image[..., 3:] if image.shape[-1] > 3 else None
         others = given.get("error"), given.get("passes")
         return Result(picture, {}, picture - shining, alpha, *others)

@@ -122,8 +122,6 @@ def _picture(images: Layers, given: Layers, part: bool) -> Layers:
     assert beauty is not None
     if environment is None:
         environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
-    elif alpha is not None:
-        environment = np.where(alpha == 1, environment, 0)
     if alpha is not None and not part and np.all(alpha == 1):
         alpha = None
     seen = images["seen_albedo"]
