@@ -167,8 +167,8 @@ class Worker:
         method = self.denoiser.method_for(frame)
         if arguments.reference and (frame.reference is None or method.name == WHOLE):
             raise ValueError(
-                f"{job.source}: --reference needs indirect light with a layer reference, and there "
-                "is none; `jflnr metrics` compares pictures"
+                f"{job.source}: --reference needs a layer reference, and there is none for what "
+                f"{method.name} denoises"
             )
         shapes = tuple(getattr(image, "shape", None) for image in vars(frame).values())
         times = [time.perf_counter()]

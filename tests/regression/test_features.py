@@ -4,7 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jflnr.regression.features import antialiased, filter_features
+from jflnr.images.noisy_guides import antialiased
+from jflnr.regression.features import filter_features
 
 filtered = jax.jit(filter_features)
 
