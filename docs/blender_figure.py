@@ -20,10 +20,8 @@ BLENDER, SCENE = ROOT / "cache/bpy-5.0.1/bin/python", ROOT / "tests/layouts/blen
 OUT = ROOT / "out" / "blender"
 COMBINED = "ViewLayer.Combined"
 RUNS = {
-    "`flr`": [],
-    "`flr`, `--direct`": ["--direct"],
-    "`flr-adaptive`, `--direct`": ["--direct", "--method", "flr-adaptive"],
-    "`flr` with the ambient occlusion of one ray": ["--map", "ao=ViewLayer.Ambient Occlusion"],
+    "`flr`": ["--method", "flr"],
+    "`picture`": [],
 }
 
 

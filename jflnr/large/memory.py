@@ -47,6 +47,11 @@ def keep_freed() -> None:
         ctypes.CDLL("libc.so.6").mallopt(TRIM_THRESHOLD, KEPT)
 
 
+def holds(height: int, width: int, memory: int, at_once: int) -> bool:
+    """Whether whole frames may be read, though they may have to be denoised in tiles."""
+    return BASE + at_once * WHOLE["flr"] * height * width <= memory
+
+
 def tile_for(height: int, width: int, memory: int, at_once: int, method: Any) -> int | None:
     """The side of the pieces for a frame of this size, or None if it may be denoised whole.
 
