@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -53,10 +53,14 @@ class Frame:
     seen_normal: Array | None = None  # (H, W, 3) likewise
     lobes: Array | None = None  # (H, W, 6 n) direct and indirect light of n kinds of surfaces
     lobe_colours: Array | None = None  # (H, W, 3 n) what that is to be multiplied by
+    # Whether its file says that it is of one sample per pixel, in which every layer is noise.
+    single: bool = field(default=False, metadata={"static": True})
 
     def map(self, change: Callable[[Array], Array]) -> Frame:
         """The frame with every layer changed."""
-        there = {name: change(layer) for name, layer in vars(self).items() if layer is not None}
+        names = (each.name for each in dataclasses.fields(self) if not each.metadata.get("static"))
+        layers = {name: getattr(self, name) for name in names}
+        there = {name: change(layer) for name, layer in layers.items() if layer is not None}
         return dataclasses.replace(self, **there)
 
 
@@ -75,7 +79,7 @@ def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | Non
 
 def frame_of(source: layouts.Source) -> Frame:
     """The frame in a file that `layouts.load` read; raises as `read_frame` does."""
-    return Frame(**layouts.assemble(source))  # type: ignore[arg-type]
+    return Frame(**layouts.assemble(source), single=layouts.samples(source) == 1)  # type: ignore[arg-type]
 
 
 def read_header(path: exr.PathLike) -> dict:
@@ -120,6 +124,6 @@ def not_finite(frame: Frame) -> dict[str, int]:
     """How many pixels of each layer hold a NaN or an infinity, for the layers that have any."""
     counts = {}
     for name, image in vars(frame).items():
-        if image is not None and not (finite := np.isfinite(image)).all():
+        if name != "single" and image is not None and not (finite := np.isfinite(image)).all():
             counts[name] = int((~finite.all(axis=-1)).sum())
     return counts

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr import exr
+from jflnr import exr, layouts
 from jflnr.frame import Frame, composite, not_finite, read_frame, read_header, write_frame
 
 
@@ -21,10 +21,11 @@ def change(path: Path, drop: str = "", add: dict[str, np.ndarray] | None = None)
 
 def test_what_is_written_is_read(frame: Frame, frame_file: Path) -> None:
     read = read_frame(frame_file)
-    for field in dataclasses.fields(Frame):
-        image = getattr(read, field.name)
+    for name in layouts.LAYERS:
+        image = getattr(read, name)
         assert image.dtype == np.float32
-        np.testing.assert_array_equal(image, getattr(frame, field.name), err_msg=field.name)
+        np.testing.assert_array_equal(image, getattr(frame, name), err_msg=name)
+    assert all(getattr(read, name) is None for name in layouts.PICTURE)
     assert read_header(frame_file) == {"scene": "made up", "view": 0}
     types = {name: pixels.dtype for name, pixels in exr.read_channels(frame_file).items()}
     assert types.pop("depth.Z") == np.float32
@@ -43,7 +44,7 @@ def test_optional_layers_are_none(tmp_path: Path, frame: Frame) -> None:
     )
     write_frame(tmp_path / "a.exr", least)
     read = read_frame(tmp_path / "a.exr")
-    assert [f.name for f in dataclasses.fields(Frame) if getattr(read, f.name) is not None] == [
+    assert [name for name in layouts.LAYERS if getattr(read, name) is not None] == [
         "indirect",
         "albedo",
         "normal",

@@ -16,8 +16,8 @@ from pathlib import Path
 import bpy
 
 JFLNR = os.environ.get("JFLNR", "jflnr")
-OPTIONS = ["--direct", "--method", "flr-adaptive", "--channels", "picture"]
-PASSES = ("diffuse_direct", "diffuse_indirect", "diffuse_color", "normal", "z")
+OPTIONS = ["--channels", "picture"]
+PASSES = ("normal", "z", "position", "emit", "environment")
 
 
 def main() -> bpy.types.Image:
@@ -35,6 +35,7 @@ def render(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, path: Path) 
     image, passes = scene.render.image_settings, [f"use_pass_{name}" for name in PASSES]
     wanted = [(scene.render, "engine", "CYCLES"), (scene.render, "filepath", str(path))]
     wanted += [(scene.cycles, "use_denoising", False)]
+    wanted += [(view_layer.cycles, "denoising_store_passes", True)]
     wanted += [(view_layer, name, True) for name in passes]
     if hasattr(image, "media_type"):  # Blender 5.0 and later
         wanted += [(image, "media_type", "MULTI_LAYER_IMAGE")]

@@ -36,7 +36,7 @@ Given = dict[str, np.ndarray]
 
 
 class Loaded(NamedTuple):
-    """A frame that was read; `tile` is set instead for one that is to be denoised in pieces."""
+    """A frame that was read, or that is to be read in pieces; `tile`: what it is denoised in."""
 
     job: Job
     source: layouts.Source | None = None
@@ -79,21 +79,19 @@ class Worker:
         """What denoises; made where it is used, since it does not travel to another process."""
         return jflnr.Denoiser(**self.settings)
 
-    @functools.cached_property
-    def lobe_denoiser(self) -> "jflnr.Denoiser":
-        """The same, with light passes."""
-        method = method_of(self.settings["method"] or WHOLE)
-        return jflnr.Denoiser(**self.settings | {"method": method, "lobes": True})
-
-    def denoiser_for(self, frame: "Frame") -> "jflnr.Denoiser":
-        """The one for a frame, whose light passes are cleaned if they are asked for."""
+    def denoiser_for(self, frame: "Frame", tile: int | None) -> "jflnr.Denoiser":
+        """The one for a frame, which also cleans light passes if they are asked for."""
         whole = self.denoiser.method_for(frame).name == WHOLE
         if self.arguments.lobes and not whole:
             raise ValueError("--lobes is for pictures of other programs and --method picture")
         asked = self.arguments.lobes or (
             self.arguments.channels == "all" and frame.lobes is not None
         )
-        return self.lobe_denoiser if whole and asked else self.denoiser
+        if not (whole and asked) and tile is None:
+            return self.denoiser
+        lobes = {"lobes": True, "method": self.settings["method"] or WHOLE}
+        others = (lobes if whole and asked else {}) | {"tile": tile}
+        return jflnr.Denoiser(**self.settings | others)
 
     def __call__(self, job: Job) -> Record:
         return self.write(self.denoise(self.read(job)))
@@ -120,7 +118,8 @@ class Worker:
         """given: what denoises instead of the denoiser; it may be called twice."""
         if isinstance(loaded, dict):
             return loaded
-        return self._reported(loaded.job, lambda: self._denoise(loaded, given or self._given))
+        given = given or functools.partial(self._given, tile=loaded.tile)
+        return self._reported(loaded.job, lambda: self._denoise(loaded, given))
 
     def write(self, denoised: Denoised | Record) -> Record:
         if isinstance(denoised, dict):
@@ -146,11 +145,14 @@ class Worker:
         if method is None:
             other = layouts.is_picture(attributes.names) or "beauty" in dict(self.arguments.map)
             method = method_of(WHOLE if other else DEFAULT)
-        if tile := memory.tile_for(*attributes.size, bound, self.at_once, method):
+        tile = memory.tile_for(*attributes.size, bound, self.at_once, method)
+        if tile is not None and not memory.holds(*attributes.size, bound, self.at_once):
             return Loaded(job, tile=tile)
         source = layouts.load(job.source, self.arguments.spp, dict(self.arguments.map))
         self.exr_seconds["read"] += time.perf_counter() - start
-        return Loaded(job, source, frame_of(source))
+        # On a device, what does not work in tiles is tried whole.
+        tile = tile if self.settings["backend"] == "jax" else None
+        return Loaded(job, source, frame_of(source), tile)
 
     def _denoise(
         self, loaded: Loaded, denoise_frame: Callable[["Frame"], Given]
@@ -167,8 +169,8 @@ class Worker:
         method = self.denoiser.method_for(frame)
         if arguments.reference and (frame.reference is None or method.name == WHOLE):
             raise ValueError(
-                f"{job.source}: --reference needs indirect light with a layer reference, and there "
-                "is none; `jflnr metrics` compares pictures"
+                f"{job.source}: --reference needs a layer reference, and there is none for what "
+                f"{method.name} denoises"
             )
         shapes = tuple(getattr(image, "shape", None) for image in vars(frame).values())
         times = [time.perf_counter()]
@@ -209,8 +211,8 @@ class Worker:
             record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
         return Denoised(job, source, frame, result, about, record)
 
-    def _given(self, frame: "Frame") -> Given:
-        denoiser = self.denoiser_for(frame)
+    def _given(self, frame: "Frame", tile: int | None) -> Given:
+        denoiser = self.denoiser_for(frame, tile)
         given = denoiser(frame)
         if not isinstance(given, tuple):
             return {"image": given}

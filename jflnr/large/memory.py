@@ -15,9 +15,9 @@ SHARE = 0.5
 # Measured (docs/large.md): what the program takes before any frame; bytes per pixel of a frame that
 # is denoised whole, of a frame that waits in pieces, and of a piece with what it overlaps.
 BASE = 450 * 2**20
-WHOLE = 320
-REST = {"flr": 1, "flr-adaptive": 1, "flnr": 17}
-PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 230}
+WHOLE = {"flr": 320, "picture": 5300}
+REST = {"flr": 1, "flr-adaptive": 1, "flnr": 17, "picture": 1}
+PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 230, "picture": 5300}
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
 # The name that glibc's <malloc.h> gives what `keep_freed` sets, and bytes that are kept.
@@ -47,6 +47,11 @@ def keep_freed() -> None:
         ctypes.CDLL("libc.so.6").mallopt(TRIM_THRESHOLD, KEPT)
 
 
+def holds(height: int, width: int, memory: int, at_once: int) -> bool:
+    """Whether whole frames may be read, though they may have to be denoised in tiles."""
+    return BASE + at_once * WHOLE["flr"] * height * width <= memory
+
+
 def tile_for(height: int, width: int, memory: int, at_once: int, method: Any) -> int | None:
     """The side of the pieces for a frame of this size, or None if it may be denoised whole.
 
@@ -54,7 +59,7 @@ def tile_for(height: int, width: int, memory: int, at_once: int, method: Any) ->
     Raises ValueError if even the smallest pieces would take more.
     """
     pixels = height * width
-    if BASE + at_once * WHOLE * pixels <= memory:
+    if BASE + at_once * WHOLE.get(method.name, WHOLE["flr"]) * pixels <= memory:
         return None
     if not hasattr(method, "stages"):
         raise ValueError(f"method {method.name} needs the whole frame in memory: raise --memory")

@@ -5,6 +5,7 @@ OpenEXR's own Python module only knows whole files. Files of one part in scan li
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from jflnr import exr, layouts
-from jflnr.frame import Frame
+from jflnr.frame import Frame, frame_of
 from jflnr.large.source import Rows
 from jflnr.layouts.source import recognise
 
@@ -70,8 +71,9 @@ class Scanlines:
         """The rows of these layers on demand."""
 
         def read(start: int, stop: int) -> Frame:
-            found = layouts.assemble(self.part(start, stop, layers))
-            return Frame(**{n: a if n in layers else None for n, a in found.items()})  # type: ignore[arg-type]
+            found = frame_of(self.part(start, stop, layers))
+            other = {name for name in vars(found) if name not in (*layers, "single")}
+            return dataclasses.replace(found, **dict.fromkeys(other))  # type: ignore[arg-type]
 
         return Rows(self.height, self.width, read)
 

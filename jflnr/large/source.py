@@ -41,12 +41,9 @@ def rows_of(frame: Frame) -> Rows:
     (height, width), factor = frame.normal.shape[:2], factor_of(frame)
 
     def read(start: int, stop: int) -> Frame:
-        fine = {
-            name: None if image is None else np.asarray(image[start:stop])
-            for name, image in vars(frame).items()
-        }
         coarse = np.asarray(frame.indirect[start // factor : -(-stop // factor)])
-        return Frame(**fine | {"indirect": coarse})  # type: ignore[arg-type]
+        fine = jax.tree.map(lambda layer: np.asarray(layer[start:stop]), frame)
+        return dataclasses.replace(fine, indirect=coarse)
 
     return Rows(height, width, read, factor)
 

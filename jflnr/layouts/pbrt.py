@@ -12,8 +12,10 @@ import numpy as np
 from jflnr.layouts.channels import Layout
 
 NOTE = "R, G, B is divided by Albedo and denoised"
-WORLD = "points behind z = 0 show that P is in world coordinates; depth comes from worldToCamera"
-ADVICE = {"depth": "P is in world coordinates and the header has no worldToCamera"}
+WORLD = (
+    "points behind z = 0 show that P is in world coordinates; depth comes from worldToCamera, and "
+    "without it there is none"
+)
 BEAUTY, ALBEDO = ("R", "G", "B"), ("Albedo.R", "Albedo.G", "Albedo.B")
 VECTORS = {"normal": ("Ns.", "N.", "Ns", "N"), "position": ("P.", "P")}
 
@@ -26,7 +28,7 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     names |= {"beauty": BEAUTY, "albedo": ALBEDO}
     z = names["position"][2]
     if (channels[z] < 0).any():
-        return Layout("pbrt", names, BEAUTY, (NOTE, WORLD), ADVICE)
+        return Layout("pbrt", names, BEAUTY, (NOTE, WORLD))
     return Layout("pbrt", names | {"depth": (z,)}, BEAUTY, (NOTE, f"depth is {z}"))
 
 

@@ -1,6 +1,7 @@
 """A file, and what its channels mean."""
 
 import functools
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,6 +71,14 @@ def recognise(
             if (found := program(own)) is not None:
                 return override(found, mapped, own)
     return override(native.layout(spp or (counts or [1])[0], own), mapped, own)
+
+
+def samples(source: Source) -> int | None:
+    """Samples per pixel of another program's picture, if its header says so."""
+    for name, value in source.attributes.others.items():
+        if name == "samplesPerPixel" or re.fullmatch(r"cycles\..*\.samples", name):
+            return int(value) if str(value).isdigit() else None
+    return None
 
 
 def picture(channels: Mapping[str, np.ndarray], source: str) -> np.ndarray:

@@ -52,5 +52,5 @@ def split(
     total = jnp.sum(expected, axis=(2, 3)) + fits[:, :, -1]
     each = jnp.where(total > 0, reflected / jnp.where(total > 0, total, 1), 0)
     split = expected * each[:, :, None, None] / jnp.where(clean > 0, clean, 1)
-    left = reflected - jnp.sum(split * clean, axis=(2, 3))
+    left = jnp.maximum(reflected - jnp.sum(split * clean, axis=(2, 3)), 0)
     return split.reshape(passes.shape), left

@@ -8,6 +8,7 @@ filtered as features are.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
@@ -22,8 +23,8 @@ from jflnr.regression.features import MARGIN, coverage, filter_features
 from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage
 
-# Side in pixels of the blocks of the first pass, with 2 samples per pixel and more; with one, 4.
-BLOCK = 2
+# Side in pixels of the blocks of the first pass, with 2 samples per pixel and more, and with one.
+BLOCK, BLOCK_OF_ONE = 2, 4
 # Darker surfaces are not divided by their albedo, which is hardly known.
 LEAST_ALBEDO = 0.02
 # Of what covers less of a pixel too little is known to learn from it.
@@ -153,9 +154,11 @@ class WholePicture(AdaptiveFLR):
             raise ValueError("method picture is for pictures of other programs: there is no beauty")
         same_size(frame, self.name)
         if self.lobes and frame.lobes is None:
-            raise ValueError(
-                "there are no light passes with their colours, which lobes are made of"
-            )
+            raise ValueError("lobes are made of light passes with their colours: there are none")
+        if frame.single:
+            # One sample does not show that it is not at the pixel's centre.
+            block = BLOCK_OF_ONE if self.block == BLOCK else self.block
+            return dataclasses.replace(self, block=block, filtered=True)
         return self
 
     def images(

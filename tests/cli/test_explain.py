@@ -25,7 +25,8 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Plan:
     cost = {"blocks-8": 1.0, "blocks-4": 1.5}
     plan = Plan("blocks-8", ("normal", "ao"), decibels, cost, 12.0, order, 8, 3)
     monkeypatch.setattr(method, "plan_of", lambda *arguments: plan)
-    monkeypatch.setattr(denoising, "Denoiser", lambda **_: lambda frame: 0.5 * frame.indirect)
+    half = lambda _, frame: 0.5 * frame.indirect
+    monkeypatch.setattr(denoising.Denoiser, "__call__", half)
     return plan
 
 

@@ -20,9 +20,9 @@ reuse = [HealthCheck.function_scoped_fixture, *HealthCheck]
 WORDS = st.sampled_from(
     "denoise info metrics fit devices -o --output --spp --method --backend --guides --params "
     "--sigma --eps --eps-prime --block --png --reference --overwrite --json --steps --help "
-    "--temporal --history --explain --error-map --direct --map --memory --channels --profile "
+    "--temporal --history --explain --error-map --lobes --map --memory --channels --profile "
     "--version -- - -1 0 1 8 nan inf 1e400 1M flr flr-adaptive flnr flnr-small bmfr auto "
-    "jax opencl normal,depth colour depth=Z all , frame.exr junk.exr empty.exr params.json "
+    "picture jax opencl normal,depth colour depth=Z all , frame.exr junk.exr empty.exr params.json "
     "nowhere/out.exr folder . ..".split()
 )
 LINES = st.lists(st.one_of(WORDS, WORDS, st.text(max_size=8)), max_size=7)

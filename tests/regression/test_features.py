@@ -4,8 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jflnr.images.noisy_guides import antialiased
 from jflnr.regression import features
-from jflnr.regression.features import antialiased, coverage, filter_features
+from jflnr.regression.features import coverage, filter_features
 
 filtered = jax.jit(filter_features)
 

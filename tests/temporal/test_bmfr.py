@@ -124,8 +124,7 @@ def test_lost_samples_and_the_sky_do_no_harm(frames):
 def room_and_reference():
     """A corner of the shipped frame, of the layers that `shot` has."""
     frame = jflnr.read_frame(denoising.SHIPPED_FRAME)
-    crop = {name: layer for name, layer in vars(frame).items() if layer is not None}
-    crop = {name: layer[: SIZE[0], : SIZE[1]] for name, layer in crop.items()}
+    crop = vars(jax.tree.map(lambda layer: layer[: SIZE[0], : SIZE[1]], frame))
     names = ("indirect", "albedo", "normal", "depth", "position", "mask")
     motion = np.zeros((*SIZE, 2), np.float32)
     return jflnr.Frame(**{n: crop[n] for n in names}, motion=motion), crop["reference"]

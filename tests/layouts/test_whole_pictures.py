@@ -1,0 +1,245 @@
+"""Whole pictures, from files that Cycles wrote, through every entry point.
+
+`cutout.exr` is of Blender 4.5, on a transparent film, `blurred.exr` of Blender 5.0, in one part per
+pass; both are of 64 x 36 pixels and 4 samples per pixel (`experiments/rendering/blender.py`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+import jflnr
+from jflnr import exr, layouts, methods
+from jflnr.cli import main
+from jflnr.frame import Frame, read_frame
+from jflnr.methods import default_of, method_of
+from jflnr.regression.lobes import split
+from jflnr.regression.picture import WholePicture
+from tests.layouts.test_faults import picture_of
+from tests.layouts.test_pbrt import gbuffer
+from tests.layouts.test_rows import mitsuba
+
+FOLDER = Path(__file__).with_name("cycles")
+FEW = WholePicture(levels=2)
+LOBES = dataclasses.replace(FEW, lobes=True)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`cutout.exr` with few guides, which soon compile."""
+    left = exr.read_channels(FOLDER / "cutout.exr")
+    left = {
+        name: a for name, a in left.items() if ".Position" not in name and "g Normal" not in name
+    }
+    path = tmp_path_factory.mktemp("cycles") / "cutout.exr"
+    exr.write_channels(path, left)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cutout(source: Path) -> Frame:
+    return read_frame(source)
+
+
+@pytest.fixture(scope="module")
+def clean(cutout: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """The picture `(H, W, 4)` and its light passes."""
+    return jflnr.denoise(cutout, LOBES)
+
+
+def radiance(lobes: np.ndarray, colours: np.ndarray) -> np.ndarray:
+    """What passes make up together, `(H, W, 3)`."""
+    size = lobes.shape[:2]
+    return np.sum(lobes.reshape(*size, -1, 2, 3) * colours.reshape(*size, -1, 1, 3), axis=(2, 3))
+
+
+@pytest.mark.parametrize("name", ["cutout", "blurred"])
+def test_the_layers_of_a_file_make_up_its_beauty(name: str) -> None:
+    """In half precision; of both generations of names."""
+    frame = read_frame(FOLDER / f"{name}.exr")
+    own = frame.emitted + frame.environment
+    total = radiance(frame.lobes, frame.lobe_colours) + own
+    np.testing.assert_allclose(total, frame.beauty, atol=2e-3 * frame.beauty.max())
+    assert (frame.alpha is None) == (name == "blurred")
+    assert frame.lobes.shape == (36, 64, 18) and not frame.single
+    assert np.all(frame.seen_albedo >= 0) and frame.seen_normal.shape == (36, 64, 3)
+
+
+def test_without_denoising_data_albedo_is_the_sum_of_the_colours(tmp_path: Path) -> None:
+    channels = exr.read_channels(FOLDER / "cutout.exr")
+    left = {name: pixels for name, pixels in channels.items() if "Denoising" not in name}
+    exr.write_channels(tmp_path / "a.exr", left)
+    read = read_frame(tmp_path / "a.exr")
+    size = read.beauty.shape[:2]
+    colours = read.lobe_colours.reshape(*size, 3, 3).sum(axis=2)
+    np.testing.assert_allclose(read.seen_albedo, colours, rtol=1e-6)
+    assert read.seen_normal is None
+
+
+@pytest.mark.parametrize("program", [mitsuba, gbuffer, picture_of])
+def test_other_programs_pictures_are_denoised_whole(
+    tmp_path: Path, frame: Frame, program: object
+) -> None:
+    exr.write_channels(tmp_path / "a.exr", program(frame))  # type: ignore[operator]
+    read = read_frame(tmp_path / "a.exr")
+    assert default_of(read) == "picture"
+    channels = exr.read_channels(tmp_path / "a.exr")
+    np.testing.assert_array_equal(read.beauty, np.stack([channels[c] for c in "RGB"], axis=-1))
+    assert layouts.is_picture(exr.read_attributes(tmp_path / "a.exr").names)
+
+
+def test_our_own_frames_are_not(frame: Frame, frame_file: Path) -> None:
+    assert default_of(frame) == default_of(read_frame(frame_file)) == "flr"
+    assert not layouts.is_picture(exr.read_attributes(frame_file).names)
+    with pytest.raises(ValueError, match="there is no beauty"):
+        jflnr.denoise(frame, "picture")
+
+
+def test_one_sample_per_pixel_takes_larger_blocks(tmp_path: Path) -> None:
+    source, name = FOLDER / "cutout.exr", "cycles.ViewLayer.samples"
+    others = exr.read_attributes(source).others
+    assert others[name] == "4"
+    exr.write_channels(tmp_path / "a.exr", exr.read_channels(source), others=others | {name: "1"})
+    frame = read_frame(tmp_path / "a.exr")
+    method = WholePicture().for_frame(frame, ())
+    assert frame.single and method.filtered and method.block == 4
+
+
+@pytest.mark.filterwarnings("error")
+def test_there_is_less_noise_and_no_less_light(cutout: Frame, clean: tuple) -> None:
+    """Nobody is warned that there is no ambient occlusion, which Cycles has none of."""
+    picture, noisy = clean[0][..., :3], cutout.beauty
+    assert np.all(np.isfinite(picture)) and np.all(picture >= 0)
+    ripple = lambda image: np.mean(np.abs(np.diff(image, 2, axis=1)))
+    assert ripple(picture) < 0.6 * ripple(noisy)
+    assert abs(np.mean(picture) / np.mean(noisy) - 1) < 0.05
+
+
+def test_alpha_stays_where_it_is_and_gets_smoother(cutout: Frame, clean: tuple) -> None:
+    alpha, noisy = clean[0][..., 3:], cutout.alpha
+    assert np.all((alpha >= 0) & (alpha <= 1))
+    inside = np.pad(noisy[..., 0], 4, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(inside, (9, 9))
+    for value in (0, 1):
+        far = np.all(windows == value, axis=(2, 3))
+        assert far.any()
+        np.testing.assert_allclose(alpha[far], value, atol=1e-6)
+    assert np.sum(np.abs(np.diff(alpha, axis=1))) < np.sum(np.abs(np.diff(noisy, axis=1)))
+
+
+def test_passes_sum_to_the_picture(cutout: Frame, clean: tuple) -> None:
+    picture, passes = clean[0][..., :3], clean[1]
+    n = cutout.lobes.shape[-1]
+    lobes, colours, own = np.split(passes, [n, n + n // 2], axis=-1)
+    total = radiance(lobes, colours) + own[..., :3] + own[..., 3:]
+    np.testing.assert_allclose(total, picture, atol=1e-5 * picture.max())
+    assert np.all(passes >= 0)
+    # Each keeps about the light that it had: to as much as edges of colours change it.
+    before = cutout.lobes.reshape(36, 64, 3, 2, 3) * cutout.lobe_colours.reshape(36, 64, 3, 1, 3)
+    after = lobes.reshape(before.shape) * colours.reshape(36, 64, 3, 1, 3)
+    shares = [np.mean(image, axis=(0, 1, 4)) / np.mean(image) for image in (before, after)]
+    np.testing.assert_allclose(*shares, atol=0.5)
+
+
+def test_light_that_no_pass_holds_is_given_to_none(rng: np.random.Generator) -> None:
+    """Where passes hold half of the light, what they leave is the other half."""
+    passes = np.float32(np.ones((16, 24, 6)) * [1, 1, 1, 0, 0, 0])
+    colour = np.full((16, 24, 3), 0.5, np.float32)
+    guides = (np.zeros((16, 24, 0), np.float32),)
+    light = np.ones((16, 24, 3), np.float32)
+    found, left = jax.jit(split)(2 * light, light, passes, (colour, colour), guides, light[..., 0])
+    np.testing.assert_allclose(left, light, rtol=1e-3)
+    np.testing.assert_allclose(found, 2 * passes, rtol=1e-3, atol=1e-5)
+
+
+def test_tiles_give_the_whole(cutout: Frame, clean: tuple) -> None:
+    tiles = jflnr.denoise(cutout, FEW, tile=24)
+    np.testing.assert_allclose(tiles, clean[0], atol=1e-5 * clean[0].max())
+
+
+def test_the_device_gives_the_same(cutout: Frame, clean: tuple) -> None:
+    pytest.importorskip("pyopencl")
+    image = jflnr.denoise(cutout, FEW, backend="opencl")
+    np.testing.assert_allclose(image, clean[0], atol=2e-3 * clean[0].max())
+    out = np.empty_like(image)
+    assert jflnr.Denoiser(FEW, backend="opencl")(cutout, out) is out
+    np.testing.assert_array_equal(out, image)
+
+
+@pytest.mark.parametrize("backend", ["jax", "opencl"])
+def test_the_first_frame_of_a_shot_is_the_frame_alone(
+    cutout: Frame, clean: tuple, backend: str
+) -> None:
+    if backend == "opencl":
+        pytest.importorskip("pyopencl")
+    still = dataclasses.replace(cutout, motion=np.zeros((36, 64, 2), np.float32))
+    denoiser = jflnr.Denoiser(FEW, backend=backend)
+    first = denoiser.next(still)
+    np.testing.assert_allclose(first, clean[0], atol=2e-3 * clean[0].max())
+    assert np.isfinite(denoiser.next(still)).all()
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    home = methods.HOMES["picture"]
+    monkeypatch.setitem(methods.HOMES, "picture", (*home[:2], {"levels": 2}))
+
+
+@pytest.mark.usefixtures("few")
+def test_the_command_writes_a_file_that_takes_the_inputs_place(
+    source: Path, tmp_path: Path, clean: tuple, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out.exr"
+    assert main(["denoise", str(source), "-o", str(out), "--channels", "all", "--json"]) == 0
+    (record,) = json.loads(capsys.readouterr().out)
+    assert record["method"] == "picture" and record["warnings"] == []
+    given, made = exr.read_channels(source), exr.read_channels(out)
+    assert set(made) == set(given) | set("RGBA")
+    view = "ViewLayer.Combined."
+    for i, c in enumerate("RGBA"):
+        np.testing.assert_allclose(made[c], clean[0][..., i], rtol=1e-5, atol=1e-6)
+        np.testing.assert_array_equal(made[c], made[view + c])
+    names = layouts.load(source).layout
+    passes = layouts.pass_names(names)
+    for name, plane in zip(passes, np.moveaxis(clean[1], -1, 0), strict=True):
+        np.testing.assert_allclose(made[name], plane, rtol=1e-4, atol=1e-5)
+    for name in set(given) - {*passes, *(view + c for c in "RGBA")}:
+        np.testing.assert_array_equal(made[name], given[name])
+    again = read_frame(out)
+    total = radiance(again.lobes, again.lobe_colours) + again.emitted + again.environment
+    behind = (again.alpha < 1) * np.float32(1)
+    error = (total - again.beauty) * (1 - behind)
+    np.testing.assert_allclose(error, 0, atol=1e-5 * again.beauty.max())
+
+
+def test_info_says_what_is_denoised(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(FOLDER / "blurred.exr")]) == 0
+    shown = capsys.readouterr().out
+    assert "the whole picture, ViewLayer.Combined" in shown
+    assert "seen_albedo (ViewLayer.Denoising Albedo)" in shown
+    assert main(["info", str(FOLDER / "cutout.exr"), "--json"]) == 0
+    use = json.loads(capsys.readouterr().out)["denoiser"]
+    assert use["method"] == "picture" and use["pixels"] > 0
+
+
+@pytest.mark.parametrize(
+    "options", [["--lobes", "--method", "flr"], ["--guides", "depth", "--lobes"]]
+)
+def test_lobes_are_of_whole_pictures(
+    tmp_path: Path, options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out.exr"
+    assert main(["denoise", str(FOLDER / "cutout.exr"), "-o", str(out), *options]) == 2
+    assert "--lobes is for pictures" in capsys.readouterr().err
+
+
+def test_options_are_those_of_the_method() -> None:
+    assert method_of("picture", lobes=True).features[-1] == "lobe_colours"
+    with pytest.raises(ValueError, match="has its own features"):
+        jflnr.Denoiser("picture", guides=("normal",))
