@@ -61,7 +61,7 @@ class Frame:
         names = (each.name for each in dataclasses.fields(self) if not each.metadata.get("static"))
         layers = {name: getattr(self, name) for name in names}
         there = {name: change(layer) for name, layer in layers.items() if layer is not None}
-        return dataclasses.replace(self, **there)
+        return dataclasses.replace(self, **there)  # type: ignore[arg-type]
 
 
 def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | None = None) -> Frame:
