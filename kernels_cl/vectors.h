@@ -86,3 +86,22 @@ INLINE real exp_below_0(real x)
     power = power * t + 1;
     return x < -87.3f ? (real)0 : power * AS_REAL((AS_BITS(shifted) << 23) + 0x3f800000u);
 }
+
+// The natural logarithm of x > 0, to 2e-7 or that of itself (the polynomial is that of Cephes).
+INLINE real log_above_0(real x)
+{
+    // x = 2^e (1 + t), with 1 + t between the roots of 1/2 and of 2.
+    const bits moved = AS_BITS(x) + (0x3f800000u - 0x3f3504f3u);
+    const real e = AS_REAL((moved >> 23) | 0x4b000000u) - (8388608.0f + 127.0f);
+    const real t = AS_REAL((moved & 0x7fffffu) + 0x3f3504f3u) - 1, square = t * t;
+    real sum = 7.0376836292e-2f;
+    sum = sum * t - 1.1514610310e-1f;
+    sum = sum * t + 1.1676998740e-1f;
+    sum = sum * t - 1.2420140846e-1f;
+    sum = sum * t + 1.4249322787e-1f;
+    sum = sum * t - 1.6668057665e-1f;
+    sum = sum * t + 2.0000714765e-1f;
+    sum = sum * t - 2.4999993993e-1f;
+    sum = sum * t + 3.3333331174e-1f;
+    return t + (t * square * sum - 0.5f * square + 0.69314718f * e);
+}

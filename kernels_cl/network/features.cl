@@ -62,20 +62,20 @@ INLINE void of_pixels(
     means[6] = MIN(after, 4 * before + 0.1f);
     means[7] = (after - before) * (after - before);
 
-    values[0] = log(before + DARK);
+    values[0] = log_above_0(before + DARK);
     values[1] = 0.5f * CLAMP((after - before) / bright, -1, 4);
-    values[2] = log(1 + (after + 0.05f) / bright);
-    values[3] = log(wrong / bright + 0.01f) + 1.5f;
+    values[2] = log_above_0(1 + (after + 0.05f) / bright);
+    values[3] = log_above_0(wrong / bright + 0.01f) + 1.5f;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-        values[4 + c] = log((denoised[c] + DARK) / (before + DARK));
+        values[4 + c] = log_above_0((denoised[c] + DARK) / (before + DARK));
         values[7 + c] = guides[c];
     }
-    values[10] = log(guides[3] + 0.05f);
+    values[10] = log_above_0(guides[3] + 0.05f);
     values[11] = 2 * guides[4] - 1;
     values[12] = MIN(wrong, 3);
     values[13] = counts ? (real)1 : (real)0;
-    values[14] = log(after + 0.03f);
+    values[14] = log_above_0(after + 0.03f);
 }
 
 // light, error: (H, W, C) and (H, W) in float. mean: of the frame. map: 4 PIXEL + POOLED channels.

@@ -14,7 +14,7 @@ INLINE real luminance(const real *light)
 
 INLINE real left(real after, real before)
 {
-    return log((after + 0.05f * before + DARK) / (1.05f * before + DARK));
+    return log_above_0((after + 0.05f * before + DARK) / (1.05f * before + DARK));
 }
 
 // Writes POOLED channels, `pitch` apart. part: 1 over the pixels of a mean.
@@ -26,7 +26,7 @@ INLINE void write_means(const real *means, float part, int pitch, global float *
     WRITE(left(noisy, light), to + 3L * pitch);
     WRITE(left(means[6], light), to + 4L * pitch);
     const real dark = light + DARK;
-    WRITE(0.5f * log(part * means[7] / (dark * dark) + 1e-3f), to + 5L * pitch);
+    WRITE(0.5f * log_above_0(part * means[7] / (dark * dark) + 1e-3f), to + 5L * pitch);
 }
 
 // Of two neighbouring vectors those of even and of odd x.
