@@ -398,7 +398,6 @@ _SWEEPS = (
         "What does the network bring over adaptive FLR, at 1, 4 and 16 samples per pixel?",
         3,
         _network,
-        ("val", "test"),
         measure=everything,
     ),
     Sweep(
