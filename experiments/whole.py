@@ -1,4 +1,4 @@
-"""Whole pictures of Cycles at 4 samples per pixel: ours beside Open Image Denoise."""
+"""Whole pictures of Cycles from few to many samples: ours beside Open Image Denoise."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from experiments import data, plots, results
 from jflnr.exr import read_channels
 from jflnr.frame import Array
 from jflnr.images.guides import draw_near, typical_depth
-from jflnr.metrics import display, exposure, unbiased_mse
-from jflnr.regression.picture import Picture, denoise_picture
+from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
+from jflnr.regression.picture import BLOCK, Picture, denoise_picture
 
 NAME = "whole"
 QUESTION = "How near does a whole picture come to Open Image Denoise?"
-MINUTES = 5
+MINUTES = 15
 
 # Passes of Blender before 5.0.
 PASSES = {
@@ -32,27 +32,42 @@ PASSES = {
     "alpha": ("Combined", "A"),
 }
 FARTHEST = 1e9
+SAMPLES = 1, 4, 16, 64
 
 
 def folders() -> list[Path]:
-    """Those of the data, and those that `pictures_render` made."""
+    """Those of the data, and those that `rendering/blender.py` made."""
     roots = (data.folder().parent / "pictures", Path("cache") / "pictures")
     return [path.parent for root in roots for path in sorted(root.glob("*/4spp.exr"))]
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """PSNR without the references' noise of every picture, by each method."""
+    """PSNR without the references' noise, SSIM and FLIP of every picture, by each method."""
     rows = []
     for folder in folders()[: 1 if quick else None]:
-        picture, halves = read(folder / "4spp.exr"), references(folder / "reference.exr")
-        row: dict[str, Any] = {"picture": folder.name}
-        for name, image in images(picture).items():
-            row[name] = psnr(image, *halves)
-        print("  {picture}: {ours:.2f} dB, OIDN {clean:.2f}".format(**row), flush=True)
-        rows.append(row)
-    keys = [key for key in rows[0] if key != "picture"] if rows else []
-    rows.append({"picture": "mean"} | {k: float(np.mean([r[k] for r in rows])) for k in keys})
-    return {"pictures": rows}
+        halves = references(folder / "reference.exr")
+        for spp in (4,) if quick else SAMPLES:
+            if not (folder / f"{spp}spp.exr").exists():
+                continue
+            picture = read(folder / f"{spp}spp.exr")
+            row: dict[str, Any] = {"spp": spp, "picture": folder.name}
+            for name, image in images(picture, spp).items():
+                row |= {f"{name}_{key}": x for key, x in metrics(image, *halves).items()}
+            print("  {picture}, {spp} spp: {ours_psnr:.2f} dB, OIDN {clean_psnr:.2f}".format(**row))
+            rows.append(row)
+    rows.sort(key=lambda row: row["spp"])
+    return {"pictures": [*rows, *means(rows)]}
+
+
+def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Per number of samples."""
+    found = []
+    for spp in sorted({row["spp"] for row in rows}):
+        same = [row for row in rows if row["spp"] == spp]
+        numbers = {k: [r[k] for r in same] for k, x in same[0].items() if isinstance(x, float)}
+        mean = {k: float(np.mean(x)) for k, x in numbers.items()}
+        found.append({"spp": spp, "picture": f"mean of {len(same)}"} | mean)
+    return found
 
 
 def read(path: Path) -> Picture:
@@ -70,8 +85,6 @@ def read(path: Path) -> Picture:
     layers["position"] = np.where(there, (layers["position"] - middle) / unit, 0)
     if np.all(layers["alpha"] == 1):
         del layers["alpha"]
-    else:  # a transparent film does not show it
-        del layers["environment"]
     return Picture(**layers)
 
 
@@ -85,14 +98,15 @@ def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return first, 2 * whole - first
 
 
-def images(picture: Picture) -> dict[str, Array]:
+def images(picture: Picture, spp: int) -> dict[str, Array]:
     """Noisy, ours, and OIDN with auxiliaries as they are and prefiltered."""
     albedo, normal = np.clip(picture.albedo, 0, 1), picture.seen_normal
     clean = (oidn(albedo=albedo), oidn(normal=normal))
-    denoise = jax.jit(denoise_picture, static_argnames="filtered")
+    denoise = jax.jit(denoise_picture, static_argnames=("filtered", "block"))
+    block = 4 if spp == 1 else BLOCK
     return {
         "noisy": picture.beauty,
-        "ours": np.asarray(denoise(picture, filtered=True).beauty),
+        "ours": np.asarray(denoise(picture, filtered=True, block=block).beauty),
         "raw": oidn(color=picture.beauty, albedo=albedo, normal=normal),
         "clean": oidn(color=picture.beauty, albedo=clean[0], normal=clean[1], cleanAux=True),
     }
@@ -121,20 +135,30 @@ def oidn(*, cleanAux: bool = False, **layers: Any) -> np.ndarray:
     return result
 
 
-def psnr(image: Array, first: np.ndarray, second: np.ndarray) -> float:
-    """Of displayed pictures, in dB."""
+def metrics(image: Array, first: np.ndarray, second: np.ndarray) -> dict[str, float | None]:
+    """Of displayed pictures: PSNR in dB without the noise of the halves, SSIM and FLIP."""
     scale = exposure((first + second) / 2)
-    shown = (display(np.asarray(x, np.float64), scale) for x in (image, first, second))
-    return float(-10 * np.log10(unbiased_mse(*shown)))
+    shown, *halves = (display(np.asarray(x, np.float64), scale) for x in (image, first, second))
+    wanted = display((first + second) / 2, scale)
+    return {
+        "psnr": float(-10 * np.log10(unbiased_mse(shown, *halves))),
+        "ssim": ssim(shown, wanted),
+        "flip": flip(shown, wanted),
+    }
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """A table of PSNR per picture."""
+    """A table of PSNR per picture, with SSIM and FLIP of ours and the best."""
     columns = {
-        "picture": "picture, 4 spp",
-        "noisy": "noisy",
-        "ours": "ours",
-        "raw": "OIDN",
-        "clean": "OIDN, auxiliaries prefiltered",
+        "spp": "spp",
+        "picture": "picture",
+        "noisy_psnr": "noisy, dB",
+        "ours_psnr": "ours",
+        "raw_psnr": "OIDN",
+        "clean_psnr": "OIDN, auxiliaries prefiltered",
+        "ours_ssim": "SSIM, ours",
+        "clean_ssim": "OIDN",
+        "ours_flip": "FLIP, ours",
+        "clean_flip": "OIDN",
     }
     plots.write_text(folder / f"{NAME}.md", results.table(result["pictures"], columns))

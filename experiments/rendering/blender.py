@@ -3,7 +3,8 @@
     python experiments/rendering/blender.py SCENE... --out cache/pictures
 
 needs Python 3.11 with `bpy==4.5.*` and `OpenEXR`, in an environment of their own. Per scene it
-writes `4spp.exr` as Blender does, and `reference.exr` from two independent halves. Everything is
+writes `1spp.exr`, `4spp.exr` and `16spp.exr` as Blender does, and `reference.exr` from two
+independent halves. Everything is
 made of Blender's primitives; settings are its defaults, except that nothing is denoised.
 """
 
@@ -21,8 +22,9 @@ import numpy as np
 import OpenEXR
 from mathutils import Vector
 
-SIZE = 480, 270
-HALF_SPP = 256
+SIZE = 320, 180
+SAMPLES = 1, 4, 16
+HALF_SPP = 128
 PASSES = (
     *("z", "normal", "position", "emit", "environment"),
     *(f"{lobe}_{part}" for lobe in ("diffuse", "glossy", "transmission")
@@ -161,7 +163,83 @@ def cutout() -> None:
     bpy.context.scene.render.film_transparent = True
 
 
-SCENES = {"blurred": blurred, "cutout": cutout}
+def room() -> None:
+    """An interior: windows with bars, a lamp, a mirror, glass, gold, and fine textures."""
+    cube = bpy.ops.mesh.primitive_cube_add
+
+    def box(size: tuple, location: tuple, made: Any) -> None:
+        put(cube, made, False, size=1, scale=size, location=location)
+
+    box((7, 7, 0.1), (0, 0, -0.05), material(checks=40, Roughness=0.25))
+    box((7, 7, 0.1), (0, 0, 2.85), material(**PLASTER))
+    box((7, 0.1, 2.8), (0, 3, 1.4), material(**PLASTER | {"Base Color": (0.5, 0.55, 0.45, 1)}))
+    box((0.1, 7, 2.8), (3, 0, 1.4), material(**PLASTER | {"Base Color": (0.6, 0.4, 0.3, 1)}))
+    box((0.1, 7, 2.8), (-3, 0, 1.4), material(**PLASTER))
+    day: dict[str, Any] = {"Emission Color": (0.75, 0.88, 1, 1), "Emission Strength": 7.0}
+    bars = material(**PLASTER | {"Base Color": (0.2, 0.12, 0.07, 1)})
+    for x in (-1.7, 0.1):
+        box((1.3, 0.02, 1.4), (x, 2.94, 1.5), material(**day))
+        for i in range(5):
+            box((0.03, 0.04, 1.4), (x - 0.6 + 0.3 * i, 2.91, 1.5), bars)
+            box((1.3, 0.04, 0.03), (x, 2.91, 0.85 + 0.33 * i), bars)
+    box((0.03, 1.6, 1.3), (2.93, 0.8, 1.5), material(**CHROME))
+    box((1.5, 0.8, 0.05), (0.3, 0.3, 0.7), material(checks=25, Roughness=0.15))
+    for x, y in ((-0.4, 0), (1, 0), (-0.4, 0.65), (1, 0.65)):
+        box((0.04, 0.04, 0.7), (x, y, 0.35), material(**CHROME))
+    lit: dict[str, Any] = {"Emission Color": (1, 0.7, 0.4, 1), "Emission Strength": 25.0}
+    sphere((2, 1.7, 1.6), 0.12, **lit)
+    sphere((0, 0.2, 0.9), 0.17, **GLASS)
+    sphere((0.75, 0.35, 0.85), 0.13, **GOLD)
+    sphere((0.4, 0, 0.8), 0.08, **GLASS | {"Base Color": (0.3, 0.8, 0.4, 1), "Roughness": 0.2})
+    monkey((-1.5, 0.6, 0.4), 30, **PAINT)
+    for i in range(14):
+        book = (0.05, 0.18, 0.22 + 0.02 * (i * 7 % 5))
+        shade = (0.1 + 0.5 * (i * 3 % 7) / 7, 0.1 + 0.4 * (i * 5 % 7) / 7, 0.2, 1)
+        cover: dict[str, Any] = {"Base Color": shade, "Roughness": 0.3}
+        box(book, (1.2 + 0.055 * i, 2.7, 1 + book[2] / 2), material(**cover))
+    box((1, 0.25, 0.03), (1.6, 2.75, 0.98), bars)
+    sky((0, 0, 0), 0)
+    camera((-0.6, -3, 1.5), (0.3, 1, 0.95), 26)
+
+
+def meadow() -> None:
+    """Blades of grass, thinner than a pixel, through a wide open lens; sky and small lamps."""
+    add = bpy.ops.mesh.primitive_plane_add
+    earth: dict[str, Any] = {"Base Color": (0.2, 0.13, 0.08, 1), "Roughness": 0.9}
+    put(add, material(**earth), False, size=40)
+    random = np.random.default_rng(5)
+    root = random.uniform((-4, -3, 0), (4, 6, 0), (6000, 3))
+    turn, lean = random.uniform(0, 2 * np.pi, 6000), random.normal(0, 0.06, (6000, 2))
+    side = 0.012 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
+    tip = root + np.column_stack([lean, random.uniform(0.15, 0.5, 6000)])
+    corners = np.stack([root - side, root + side, tip], axis=1).reshape(-1, 3)
+    mesh = bpy.data.meshes.new("grass")
+    mesh.from_pydata(corners.tolist(), [], np.arange(18000).reshape(-1, 3).tolist())
+    blade: dict[str, Any] = {"Base Color": (0.18, 0.4, 0.06, 1), "Roughness": 0.4}
+    mesh.materials.append(material(**blade))
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("grass", mesh))
+    monkey((-0.9, 0.4, 0.75), -15, **GLASS)
+    monkey((0.9, 0.8, 0.75), 20, **GOLD | {"Base Color": (0.9, 0.5, 0.4, 1)})
+    sphere((0.1, -0.5, 0.45), 0.25, **CHROME)
+    put(
+        bpy.ops.mesh.primitive_cube_add,
+        material(checks=16),
+        False,
+        size=0.9,
+        location=(2.3, 2, 0.5),
+    )
+    for i in range(10):
+        shade = (1, 0.4 + 0.05 * i, 0.2 + 0.08 * i, 1)
+        lit: dict[str, Any] = {"Emission Color": shade, "Emission Strength": 20.0}
+        sphere((-2.2 + 0.5 * i, 2.8, 1.1 + 0.1 * (i % 3)), 0.05, **lit)
+    lamp((-3, -2, 4), (0, 0, 0.4), 0.8, 300)
+    sky((0.35, 0.5, 0.9), 0.5)
+    camera((0.2, -4, 1.1), (0.1, 0, 0.65), 45)
+    lens = bpy.context.scene.camera.data.dof
+    lens.use_dof, lens.focus_distance, lens.aperture_fstop = True, 4.2, 1.4
+
+
+SCENES = {"blurred": blurred, "cutout": cutout, "room": room, "meadow": meadow}
 
 
 def settings() -> None:
@@ -215,7 +293,8 @@ def main() -> None:
         settings()
         folder = (arguments.out / name).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        render(folder / "4spp.exr", 4, 1)
+        for spp in SAMPLES:
+            render(folder / f"{spp}spp.exr", spp, spp)
         reference(folder / "reference.exr")
 
 

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jflnr.frame import Array, Frame
-from jflnr.images.noisy_guides import antialiased
+from jflnr.images.noisy_guides import antialiased, holds_light
 
 DEFAULT = ("normal", "depth", "ao")
 NAMES = ("normal", "depth", "ao", "position", "albedo")
@@ -39,14 +39,15 @@ class Scene(NamedTuple):
     """What the whole frame says of its scene, `()` and `(3,)`, so that parts of it agree.
 
     depth: median depth of the surfaces. middle: a point among them; zeros without positions.
-    light: mean of the beauty, and averaged: whether its layers are means of several samples per
-    pixel; None without a beauty.
+    Without a beauty None: light, its mean; averaged, whether its layers are means of several
+    samples per pixel; lit, whether its albedo shows what shines (`holds_light`).
     """
 
     depth: jax.Array
     middle: jax.Array
     light: jax.Array | None = None
     averaged: jax.Array | None = None
+    lit: jax.Array | None = None
 
 
 def scene_of(frame: Frame) -> Scene:
@@ -64,7 +65,10 @@ def scene_from(sample: Frame, middle: Array | None) -> Scene:
     if sample.beauty is None:
         return scene
     light = jnp.nanmean(jnp.asarray(sample.beauty, jnp.float32))
-    return scene._replace(light=light, averaged=antialiased(jnp.asarray(sample.normal)))
+    own = [layer for layer in (sample.emitted, sample.environment) if layer is not None]
+    shining = jnp.asarray(sum(own, jnp.zeros(sample.beauty.shape)))
+    lit = holds_light(jnp.asarray(sample.seen_albedo), shining)
+    return Scene(*scene[:2], light, antialiased(jnp.asarray(sample.normal)), lit)
 
 
 def thinning(height: int, width: int) -> int:

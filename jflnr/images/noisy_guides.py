@@ -9,6 +9,8 @@ import jax.numpy as jnp
 NORMAL, DEPTH = 0.25, 0.02
 # Normals that are a mean of several are shorter than 1; so many pixels of them are no accident.
 SHORT, SHARE = 0.98, 1e-3
+# Layers in half precision are added up that exactly, relative to them.
+ROUNDING = 2e-3
 
 
 def smooth_guide(guide: jax.Array, normal: jax.Array, depth: jax.Array) -> jax.Array:
@@ -60,3 +62,8 @@ def antialiased(normal: jax.Array) -> jax.Array:
     """
     length = jnp.sum(normal**2, axis=-1)
     return jnp.mean((length > 1 - SHORT) & (length < SHORT)) > SHARE
+
+
+def holds_light(albedo: jax.Array, own: jax.Array) -> jax.Array:
+    """Whether an albedo has emission and environment added to it, `()`. own: these, `(H, W, 3)`."""
+    return jnp.all(~(albedo < (1 - ROUNDING) * own - ROUNDING))

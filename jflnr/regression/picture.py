@@ -1,8 +1,9 @@
 """A whole picture, with all its materials, denoised by one regression.
 
 What reflects or transmits is `light = (beauty - emission - environment) / albedo`; the albedo
-follows mirrors and glass, as a path tracer's denoising albedo does. Emission and environment know
-no noise but that of their edges, and are filtered as features are.
+follows mirrors and glass, as a path tracer's denoising albedo does, and beyond white shows the
+lamps that are seen in them. Emission and environment know no noise but that of their edges, and are
+filtered as features are.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from jax import lax
 from jflnr.frame import Frame
 from jflnr.images.guides import FAR, Scene, draw_near, scene_of
 from jflnr.images.inputs import same_size
-from jflnr.images.noisy_guides import antialiased
+from jflnr.images.noisy_guides import antialiased, holds_light
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
-from jflnr.regression.features import REACH, filter_features
+from jflnr.regression.features import FARTHEST, coverage, filter_features
 from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage
 
@@ -30,7 +31,7 @@ BLOCK, BLOCK_OF_ONE = 2, 4
 # Darker surfaces are not divided by their albedo, which is hardly known.
 LEAST_ALBEDO = 0.02
 # Of what covers less of a pixel too little is known to learn from it.
-LEAST_ALPHA = 0.1
+LEAST_ALPHA = 0.02
 # A pixel so many times brighter than those around weighs as little as if it were no brighter.
 FIREFLY, AROUND = 20, 3
 # Guides of the lobes, which are fitted coarsely: normal, albedo and normal of what is seen.
@@ -39,14 +40,21 @@ LOBE_GUIDES = 3
 EVERYTHING = 1 << 20
 
 
+GUIDES = "normal", "albedo", "seen_normal", "depth", "position"
+# Depth and position of the pixels' centres are aliased, and would break thin lines.
+STEERING = "albedo", "normal", "seen_normal", "emission", "environment", "alpha"
+
+
 class Picture(NamedTuple):
     """What a renderer tells of a picture, `(H, W, C)` each; None where it does not.
 
-    beauty: the noisy picture. albedo: of the light that is seen, also through mirrors and glass.
-    normal: unit. seen_normal: of what is seen in mirrors and through glass. depth: over its median.
-    position: about a point of the scene, over the median depth. emission: seen directly.
-    environment: seen directly; None on a transparent film, whose beauty does not hold it. alpha:
-    share of the pixel that is covered. colours: `(H, W, 3 n)`, of lobes (`lobes.split`).
+    beauty: the noisy picture. albedo: of the light that is seen, also through mirrors and glass;
+    with emission and environment added everywhere, as Cycles does, or nowhere. normal: unit.
+    seen_normal: of what is seen in mirrors and through glass. depth: over its median. position:
+    about a point of the scene, over the median depth. emission: seen directly. environment: seen
+    directly. alpha: share of the pixel that is covered, on a transparent film, whose beauty does
+    not hold the environment, and whose other layers hold 0 beyond. colours: `(H, W, 3 n)`, of lobes
+    (`lobes.split`).
     """
 
     beauty: jax.Array
@@ -77,7 +85,9 @@ def denoise_picture(
     """
     unit = jnp.nanmean(picture.beauty)
     averaged = antialiased(picture.normal) if filtered is None else filtered
-    images = images_of(picture, clean := cleaned(picture, averaged, unit))
+    clean = cleaned(picture, averaged, unit)
+    lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
+    images = images_of(picture, clean, lit)
     layers = images["target"], images["guides"]
     fitted = flr_adaptive(*layers, method, block=block, weight=images["weight"])
     return clean._replace(beauty=composed(fitted, images))
@@ -92,20 +102,21 @@ def cleaned(picture: Picture, averaged: jax.Array | bool, unit: jax.Array) -> Pi
     return jax.tree.map(lambda new, old: jnp.where(averaged, new, old), clean, picture)
 
 
-def images_of(picture: Picture, clean: Picture) -> Parts:
-    """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again."""
-    surface = jnp.clip(clean.albedo, LEAST_ALBEDO, 1)
-    opaque = jnp.ones(surface.shape[:2], bool)
-    if clean.alpha is not None:
-        surface, opaque = surface * jnp.clip(clean.alpha, 0, 1), clean.alpha[..., 0] > LEAST_ALPHA
+def images_of(picture: Picture, clean: Picture, lit: jax.Array) -> Parts:
+    """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again.
+
+    lit: as of `holds_light`.
+    """
+    covered = jnp.ones((1,) * 3) if clean.alpha is None else jnp.clip(clean.alpha, 0, 1)
+    surface = jnp.maximum(reflecting(clean, lit), LEAST_ALBEDO * covered)
     light = jnp.maximum(picture.beauty - own_light(picture), 0) / jnp.maximum(surface, 1e-6)
-    weight = firefly_weight(light_of(light)) * opaque
-    layers = (clean.normal, clean.albedo, clean.seen_normal, clean.depth, clean.position)
+    weight = firefly_weight(light_of(light)) * (covered > LEAST_ALPHA)[..., 0]
+    guiding = clean._replace(albedo=jnp.clip(clean.albedo, 0, 1))
+    layers = [getattr(guiding, name) for name in GUIDES]
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
-    none = jnp.zeros_like(picture.beauty)
-    own = [none if layer is None else layer for layer in (clean.emission, clean.environment)]
-    images |= {"surface": surface, "own": sum(own), "alpha": clean.alpha}
+    own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
+    images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
     images |= {"emitted": own[0], "environment": own[1]}
     return images | {"colours": (picture.colours, clean.colours)}
 
@@ -126,7 +137,7 @@ class WholePicture(AdaptiveFLR):
 
     name: ClassVar[str] = "picture"
     # A firefly is told from pixels around it, and these are divided by a filtered albedo.
-    margin: ClassVar[int] = AROUND + REACH + 1
+    margin: ClassVar[int] = AROUND + FARTHEST
     guides: ClassVar[tuple[str, ...]] = (
         *("normal", "seen_albedo", "seen_normal", "depth", "position"),
     )
@@ -189,9 +200,9 @@ def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
 @functools.partial(jax.jit, static_argnames="filtered")
 def _images(filtered: bool | None, frame: Frame, scene: Scene) -> Parts:
     picture = picture_in(frame, scene)
-    assert scene.averaged is not None and scene.light is not None
+    assert scene.averaged is not None and scene.light is not None and scene.lit is not None
     averaged = scene.averaged if filtered is None else filtered
-    images = images_of(picture, cleaned(picture, averaged, scene.light))
+    images = images_of(picture, cleaned(picture, averaged, scene.light), scene.lit)
     return images | {"lobes": frame.lobes}
 
 
@@ -218,17 +229,28 @@ def picture_in(frame: Frame, scene: Scene) -> Picture:
 
 
 def own_light(picture: Picture) -> jax.Array:
-    """Emission and environment, `(H, W, 3)`: what no surface reflects."""
-    parts = (picture.emission, picture.environment)
+    """What no surface reflects and beauty holds, `(H, W, 3)`: emission, and what is behind all."""
+    behind = None if picture.alpha is not None else picture.environment
+    return light_in(picture, picture.emission, behind)
+
+
+def reflecting(picture: Picture, lit: jax.Array) -> jax.Array:
+    """The albedo of what reflects alone, `(H, W, 3)`. lit: as of `holds_light`."""
+    own = light_in(picture, picture.emission, picture.environment)
+    return jnp.maximum(picture.albedo - jnp.where(lit, own, 0), 0)
+
+
+def light_in(picture: Picture, *parts: jax.Array | None) -> jax.Array:
+    """The sum of those parts that there are, `(H, W, 3)`."""
     return sum((part for part in parts if part is not None), jnp.zeros_like(picture.beauty))
 
 
 def filter_picture(picture: Picture, unit: jax.Array) -> Picture:
-    """Every layer but the beauty without its noise; the albedo cut to 1."""
-    picture = picture._replace(albedo=jnp.clip(picture.albedo, 0, 1))
+    """Every layer but the beauty without its noise. unit: brightness of the picture, `()`."""
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
     del layers["beauty"]
-    steering = [steer(name, layer, unit) for name, layer in layers.items() if name != "colours"]
+    unit = jnp.maximum(unit, 1e-12)
+    steering = [steer(name, layer, unit) for name, layer in layers.items() if name in STEERING]
     filtered = filter_features(steering, list(layers.values()))
     return picture._replace(**dict(zip(layers, filtered, strict=True)))
 
@@ -236,9 +258,10 @@ def filter_picture(picture: Picture, unit: jax.Array) -> Picture:
 def steer(name: str, layer: jax.Array, unit: jax.Array) -> jax.Array:
     """A layer so scaled that it varies by about 1. unit: brightness of the picture, `()`."""
     if name in ("emission", "environment"):
-        light = jnp.mean(layer, axis=-1, keepdims=True)
-        return light / (jnp.abs(light) + jnp.maximum(unit, 1e-12))
-    return layer if name in ("albedo", "alpha") else layer / 2
+        return coverage(jnp.mean(layer, axis=-1, keepdims=True), unit)
+    if name == "albedo":
+        return coverage(layer, 1.0)
+    return layer if name == "alpha" else layer / 2
 
 
 def firefly_weight(light: jax.Array) -> jax.Array:

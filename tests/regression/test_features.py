@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jflnr.images.noisy_guides import antialiased
-from jflnr.regression.features import filter_features
+from jflnr.regression import features
+from jflnr.regression.features import coverage, filter_features
 
 filtered = jax.jit(filter_features)
 
@@ -20,7 +21,52 @@ def edge(rng, samples=None, size=24):
 def test_an_edge_of_few_samples_comes_nearer_to_its_coverage(rng):
     noisy, exact = edge(rng, 4), edge(rng)
     (result,) = filtered((noisy,), (noisy,))
-    assert np.mean((result - exact) ** 2) < 0.7 * np.mean((noisy - exact) ** 2)
+    assert np.mean((result - exact) ** 2) < 0.5 * np.mean((noisy - exact) ** 2)
+
+
+def blurred(image):
+    for axis in (0, 1):
+        padded = np.pad(image, [(1, 1) if a == axis else (0, 0) for a in range(image.ndim)], "edge")
+        three = [np.take(padded, range(k, k + image.shape[axis]), axis) for k in range(3)]
+        image = (three[0] + 2 * three[1] + three[2]) / 4
+    return image
+
+
+def test_the_average_is_that_of_its_formula(rng):
+    """Pixel by pixel in float64: the weight is one of the gradients, the features and the step."""
+    steer, follow = rng.random((2, 9, 11, 2))
+    near = blurred(steer)
+    down, right = (
+        np.diff(
+            np.pad(near, [(1, 1) if a == axis else (0, 0) for a in range(3)], "edge"), axis=axis
+        )
+        for axis in (0, 1)
+    )
+    down, right = (down[1:] + down[:-1]) / 2, (right[:, 1:] + right[:, :-1]) / 2
+    products = [np.sum(a * b, axis=-1) for a, b in ((down, down), (down, right), (right, right))]
+    across = blurred(blurred(blurred(np.stack(products, axis=-1))))
+    expected, reach = np.zeros_like(follow), features.REACH
+    for y, x in np.ndindex(9, 11):
+        total = 0.0
+        for v in range(max(y - reach, 0), min(y + reach + 1, 9)):
+            for u in range(max(x - reach, 0), min(x + reach + 1, 11)):
+                step = np.array([(v - y) ** 2, 2 * (v - y) * (u - x), (u - x) ** 2])
+                apart = across[y, x] @ step / features.ALIKE**2
+                apart += (step[0] + step[2]) / features.WIDTH**2
+                apart += np.sum((near[v, u] - near[y, x]) ** 2) / features.NEAR**2
+                total += np.exp(-apart / 2)
+                expected[y, x] += np.exp(-apart / 2) * follow[v, u]
+        expected[y, x] /= total
+    (result,) = filtered((np.float32(steer),), (np.float32(follow),))
+    np.testing.assert_allclose(result, expected, rtol=2e-5)
+
+
+def test_the_share_of_a_lamp_does_not_depend_on_its_light(rng):
+    share = edge(rng, 4)
+    shown = coverage(25 * share, 0.5)
+    np.testing.assert_allclose(shown, coverage(50 * share, 0.5), rtol=1e-5)
+    np.testing.assert_allclose(shown[:, 12:][share[:, 12:] == 1], 1, atol=0.3)
+    np.testing.assert_array_equal(coverage(0.4 * share, 0.5), 0.8 * share)
 
 
 def test_what_is_constant_stays(rng):

@@ -8,7 +8,7 @@ import pytest
 
 import jflnr
 from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.picture import Picture, denoise_picture
+from jflnr.regression.picture import Picture, denoise_picture, holds_light, reflecting
 
 FEW = AdaptiveFLR(levels=2)
 
@@ -67,11 +67,27 @@ def test_emission_is_no_light_of_a_surface(rng):
     np.testing.assert_allclose(np.mean(result.emission), np.mean(lamp), rtol=0.05)
 
 
+@pytest.mark.parametrize("film", [False, True])
+def test_light_that_the_albedo_holds_is_taken_from_it(rng, film):
+    """Cycles adds emission and environment; on a transparent film they are there all the same."""
+    picture, share = layers(rng)
+    own = {"emission": np.float32(9 * share), "environment": np.float32(1 - share)}
+    own = {name: np.repeat(layer, 3, axis=-1) for name, layer in own.items()}
+    plain = picture._replace(alpha=np.float32(share) if film else None, **own)
+    added = plain._replace(albedo=plain.albedo + own["emission"] + own["environment"])
+    assert holds_light(added)
+    assert not holds_light(plain)
+    for one in (plain, added):
+        reflected = reflecting(one, holds_light(one))
+        np.testing.assert_allclose(reflected, picture.albedo, atol=1e-5)
+
+
 def test_a_transparent_film_stays_empty_and_alpha_gets_smoother(rng):
     picture, share = layers(rng)
-    picture = picture._replace(beauty=np.float32(picture.beauty * share), alpha=np.float32(share))
+    behind = {name: np.float32(getattr(picture, name) * share) for name in ("beauty", "albedo")}
+    picture = picture._replace(alpha=np.float32(share), **behind)
     result = denoised(picture, filtered=True)
-    assert np.all(result.beauty[:3] == 0)
+    assert np.all(result.beauty[:2] == 0)  # beyond the window
     y, x = np.mgrid[:HEIGHT, :WIDTH][..., None] + rng.random((2, HEIGHT, WIDTH, 2000))
     exact = np.mean((x - 17) ** 2 + (y - 13) ** 2 < 60, axis=-1, keepdims=True)
     assert np.mean((result.alpha - exact) ** 2) < np.mean((share - exact) ** 2)
