@@ -14,7 +14,7 @@ import numpy as np
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.methods import BACKENDS, default_of, method_of
+from jflnr.methods import BACKENDS, DEFAULT, default_of, method_of
 from jflnr.stages import Parts, regress
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def denoise(
     the same steered by a network, `flnr-small` or `flnr-tiny`, by a smaller one (docs/flnr.md),
     `bmfr`, as in the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that
     is good enough for the frame (docs/select.md). If None, `picture` where the frame has a
-    `beauty`, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
+    `beauty` and no guides are named, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
     on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
@@ -125,7 +125,8 @@ class Denoiser:
         """The method that denoises a frame."""
         if self.method is not None:
             return self.method
-        return self._checked(method_of(default_of(frame), **self.options))
+        name = default_of(frame) if self.guides is None else DEFAULT
+        return self._checked(method_of(name, **self.options))
 
     @_own_settings
     def __call__(self, frame: Frame, out: np.ndarray | None = None) -> Any:
