@@ -65,8 +65,9 @@ def denoise(
     the same steered by a network, `flnr-small` or `flnr-tiny`, by a smaller one (docs/flnr.md),
     `bmfr`, as in the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that
     is good enough for the frame (docs/select.md). If None, `picture` where the frame has a
-    `beauty` and no guides are named, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
-    on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
+    `beauty` and no guides are named, else `flr`. options: fields of the method to replace, such as
+    `block=4`, the pixels on a side that share one model, or `keep_energy=True`, to keep the mean
+    radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
     tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
