@@ -113,25 +113,20 @@ def test_one_sample_per_pixel_takes_larger_blocks(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_there_is_less_noise_and_no_less_light(cutout: Frame, clean: tuple) -> None:
-    """Nobody is warned that there is no ambient occlusion, which Cycles has none of."""
-    picture, noisy = clean[0][..., :3], cutout.beauty
-    assert np.all(np.isfinite(picture)) and np.all(picture >= 0)
-    ripple = lambda image: np.mean(np.abs(np.diff(image, 2, axis=1)))
-    assert ripple(picture) < 0.6 * ripple(noisy)
-    assert abs(np.mean(picture) / np.mean(noisy) - 1) < 0.05
-
-
-def test_alpha_stays_where_it_is_and_gets_smoother(cutout: Frame, clean: tuple) -> None:
-    alpha, noisy = clean[0][..., 3:], cutout.alpha
-    assert np.all((alpha >= 0) & (alpha <= 1))
-    inside = np.pad(noisy[..., 0], 4, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(inside, (9, 9))
-    for value in (0, 1):
-        far = np.all(windows == value, axis=(2, 3))
-        assert far.any()
-        np.testing.assert_allclose(alpha[far], value, atol=1e-6)
-    assert np.sum(np.abs(np.diff(alpha, axis=1))) < np.sum(np.abs(np.diff(noisy, axis=1)))
+def test_picture_and_alpha_come_nearer_to_what_they_would_converge_to(
+    cutout: Frame, clean: tuple
+) -> None:
+    """Against 1024 samples. Nobody is warned that Cycles has no ambient occlusion."""
+    channels = exr.read_channels(FOLDER / "cutout_reference.exr")
+    reference = np.stack([np.float32(channels[c]) for c in "RGBA"], axis=-1)
+    noisy = np.concatenate([cutout.beauty, cutout.alpha], axis=-1)
+    assert np.all(np.isfinite(clean[0])) and np.all(clean[0] >= 0) and np.all(clean[0][..., 3] <= 1)
+    assert abs(np.mean(clean[0][..., :3]) / np.mean(cutout.beauty) - 1) < 0.05
+    shown = [np.clip(image, 0, 1) ** (1 / 2.2) for image in (noisy, clean[0], reference)]
+    before, after = (np.mean((x - shown[2]) ** 2, axis=(0, 1)) for x in shown[:2])
+    print(before, after)
+    assert np.all(after[:3] < 0.4 * before[:3])
+    assert after[3] < before[3]
 
 
 def test_passes_sum_to_the_picture(cutout: Frame, clean: tuple) -> None:
