@@ -15,7 +15,7 @@ from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
 from jflnr.lazy import jax, jit
-from jflnr.methods import BACKENDS, default_of, method_of
+from jflnr.methods import BACKENDS, DEFAULT, default_of, method_of
 from jflnr.stages import Parts, regress
 
 if TYPE_CHECKING:
@@ -76,9 +76,9 @@ def denoise(
     (docs/layouts.md), `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`,
     the same corrected by a network, `flnr-small`, by a smaller one (docs/flnr.md), `bmfr`, as in
     the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that is good enough
-    for the frame (docs/select.md). If None, `picture` where the frame has a `beauty`, else `flr`.
-    options: fields of the method to replace, such as `block=4`, the pixels on a side that share one
-    model, or `keep_energy=True`, to keep the mean radiance exactly.
+    for the frame (docs/select.md). If None, `picture` where the frame has a `beauty` and no guides
+    are named, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
+    on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
     tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
@@ -137,7 +137,8 @@ class Denoiser:
         """The method that denoises a frame."""
         if self.method is not None:
             return self.method
-        return self._checked(method_of(default_of(frame), **self.options))
+        name = default_of(frame) if self.guides is None else DEFAULT
+        return self._checked(method_of(name, **self.options))
 
     @_own_settings
     def __call__(self, frame: Frame, out: np.ndarray | None = None) -> Any:

@@ -36,7 +36,8 @@ HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
 }
 # What denoises a frame if nobody says: pictures of other programs are denoised whole.
 DEFAULT, WHOLE = "flr", "picture"
-METHODS = tuple(HOMES)
+# Those of indirect light, which every frame has.
+METHODS = tuple(name for name in HOMES if name != WHOLE)
 BACKENDS = ("jax", "opencl")
 
 

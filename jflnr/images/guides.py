@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jflnr.frame import Array, Frame
-from jflnr.images.noisy_guides import antialiased
+from jflnr.images.noisy_guides import antialiased, holds_light
 
 DEFAULT = ("normal", "depth", "ao")
 NAMES = ("normal", "depth", "ao", "position", "albedo")
 # Median depths. Of training's frames with depths beyond, the best of 3 and 4.
 FAR = 3
-# Layers in half precision are added up that exactly, relative to them.
-ROUNDING = 2e-3
 
 
 def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
@@ -38,8 +36,8 @@ class Scene(NamedTuple):
     """What the whole frame says of its scene, `()` and `(3,)`, so that parts of it agree.
 
     depth: median depth of the surfaces. middle: a point among them; zeros without positions.
-    light: mean of the beauty, and averaged: whether its layers are means of several samples per
-    pixel, lit: as of `holds_light`, opaque: whether the film is; None without a beauty.
+    Without a beauty None: light, its mean; averaged, whether its layers are means of several
+    samples per pixel; lit, whether its albedo shows what shines (`holds_light`).
     """
 
     depth: Any
@@ -47,7 +45,6 @@ class Scene(NamedTuple):
     light: Any = None
     averaged: Any = None
     lit: Any = None
-    opaque: Any = None
 
 
 def scene_of(frame: Frame) -> Scene:
@@ -66,22 +63,9 @@ def scene_from(sample: Frame, middle: Array | None) -> Scene:
     if sample.beauty is None:
         return scene
     light = xp.nanmean(xp.asarray(sample.beauty, dtype=xp.float32))
-    lit = holds_light(sample.seen_albedo, sample.emitted, sample.environment)
-    opaque = sample.alpha is None or xp.all(sample.alpha == 1)
-    averaged = antialiased(sample.normal)
-    return scene._replace(light=light, averaged=averaged, lit=lit, opaque=opaque)
-
-
-def holds_light(albedo: Array | None, *own: Array | None) -> Any:
-    """Whether an albedo of what is seen has emission and environment added to it, `()`.
-
-    Cycles adds them everywhere, others nowhere. Each `(H, W, 3)`, or None.
-    """
-    there = [layer for layer in own if layer is not None]
-    if albedo is None or not there:
-        return False
-    xp: Any = albedo.__array_namespace__()
-    return xp.all(~(albedo < (1 - ROUNDING) * sum(there) - ROUNDING))
+    own = [layer for layer in (sample.emitted, sample.environment) if layer is not None]
+    lit = holds_light(sample.seen_albedo, sum(own, xp.zeros(sample.beauty.shape)))
+    return Scene(*scene[:2], light, antialiased(sample.normal), lit)
 
 
 def thinning(height: int, width: int) -> int:

@@ -11,6 +11,8 @@ from jflnr.lazy import jax, jnp
 NORMAL, DEPTH = 0.25, 0.02
 # Normals that are a mean of several are shorter than 1; so many pixels of them are no accident.
 SHORT, SHARE = 0.98, 1e-3
+# Layers in half precision are added up that exactly, relative to them.
+ROUNDING = 2e-3
 
 
 def smooth_guide(guide: jax.Array, normal: jax.Array, depth: jax.Array) -> jax.Array:
@@ -63,3 +65,9 @@ def antialiased(normal: Array) -> Array:
     xp: Any = normal.__array_namespace__()
     length = xp.sum(normal**2, axis=-1)
     return xp.mean((length > 1 - SHORT) & (length < SHORT)) > SHARE
+
+
+def holds_light(albedo: Array, own: Array) -> Array:
+    """Whether an albedo has emission and environment added to it, `()`. own: these, `(H, W, 3)`."""
+    xp: Any = albedo.__array_namespace__()
+    return xp.all(~(albedo < (1 - ROUNDING) * own - ROUNDING))

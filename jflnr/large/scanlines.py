@@ -6,6 +6,7 @@ OpenEXR's own Python module only knows whole files. Files of one part in scan li
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -65,7 +66,16 @@ class Scanlines:
         channels = self._read(start, stop, sorted(names & set(self.channels)))
         (x, y), display = self.attributes.window
         attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
-        return layouts.Source(self.path, channels, attributes, self.layout, part=True)
+        return layouts.Source(self.path, channels, attributes, self.layout, True, self.opaque)
+
+    @functools.cached_property
+    def opaque(self) -> bool:
+        """Whether the picture's alpha, if it has one, is 1 everywhere."""
+        names = [name for name in self.layout.picture[3:] if name in self.channels]
+        starts = range(0, self.height, BATCH) if names else ()
+        stops = (min(start + BATCH, self.height) for start in starts)
+        parts = (self._read(*rows, names) for rows in zip(starts, stops, strict=True))
+        return all(np.all(part[name] == 1) for part in parts for name in names)
 
     def rows(self, layers: Collection[str]) -> Rows:
         """The rows of these layers on demand."""

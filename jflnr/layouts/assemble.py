@@ -56,7 +56,7 @@ def assemble(source: Source) -> Layers:
         images["motion"] = images["motion"] * np.array([1, -1], np.float32)
     if layout.light != "indirect" or whole:
         separated = _separated(images)
-        images |= (_picture(images | separated, images, source.part) if whole else {}) | separated
+        images |= (_picture(images | separated, images, source.opaque) if whole else {}) | separated
     if layout.lobes and not source.part:
         images |= _lobes(source)
     return {name: images[name] for name in (*LAYERS, *PICTURE)}
@@ -111,19 +111,19 @@ def _separated(images: Layers) -> Layers:
     }
 
 
-def _picture(images: Layers, given: Layers, part: bool) -> Layers:
+def _picture(images: Layers, given: Layers, opaque: bool | None) -> Layers:
     """The layers of the whole picture.
 
-    Where nothing is hit, all of it is environment, unless the program tells. Blender's pass holds
-    also what a transparent film does not show, where alpha is below 1. An alpha of 1 is none.
-    given: the layers before the picture was separated. part: of the file.
+    Where nothing is hit, all of it is environment, unless the program tells or the film is
+    transparent. given: the layers before the picture was separated. opaque: whether alpha is 1 in
+    the whole file, and so none; None to look.
     """
     beauty, environment, alpha = (images[name] for name in ("beauty", "environment", "alpha"))
     assert beauty is not None
-    if environment is None:
-        environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
-    if alpha is not None and not part and np.all(alpha == 1):
+    if alpha is not None and (np.all(alpha == 1) if opaque is None else opaque):
         alpha = None
+    if environment is None and alpha is None:
+        environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
     seen = images["seen_albedo"]
     return {
         "emitted": given["emission"],

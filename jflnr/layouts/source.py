@@ -19,7 +19,8 @@ from jflnr.layouts.override import find, override
 class Source:
     """What `load` found: every channel (H, W) in its own type, the header, and the layout.
 
-    part: only some of the file's rows and channels are here.
+    part: only some of the file's rows and channels are here. opaque: whether the picture's alpha is
+    1 in all of the file, where that is known.
     """
 
     path: Path
@@ -27,6 +28,7 @@ class Source:
     attributes: exr.Attributes
     layout: Layout
     part: bool = False
+    opaque: bool | None = None
 
     @property
     def header(self) -> dict:

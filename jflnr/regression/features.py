@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+
 from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.moments import planes
 from jflnr.regression.strips import ROWS, fill
@@ -20,9 +21,9 @@ REACH, WIDTH = 3, 2.0
 # How far features may differ, one standard deviation, where they vary by about 1: by their
 # gradients, and blurred, where two that 4 samples tell differ by 0.14 with noise alone.
 ALIKE, NEAR = 0.15, 0.3
-# Pixels beyond one that its filtered features depend on: the window, gradients and blurs of
-# features, and the window and blurs of `coverage`.
-MARGIN = REACH + 5 + REACH + 2
+# How many pixels away a filtered one looks: as far as `coverage` does, and seven times at the next
+# pixel, for blurs and gradients.
+FARTHEST = REACH + 7
 
 
 def filter_features(

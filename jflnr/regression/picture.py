@@ -13,13 +13,14 @@ import functools
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-from jflnr.frame import Frame
-from jflnr.images.guides import FAR, Scene, draw_near, holds_light, scene_of
-from jflnr.images.inputs import same_size
-from jflnr.images.noisy_guides import antialiased
+
 from jflnr.lazy import jax, jit, jnp, lax, pytree
+from jflnr.frame import Frame
+from jflnr.images.guides import FAR, Scene, draw_near, scene_of
+from jflnr.images.inputs import same_size
+from jflnr.images.noisy_guides import antialiased, holds_light
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
-from jflnr.regression.features import MARGIN, coverage, filter_features
+from jflnr.regression.features import FARTHEST, coverage, filter_features
 from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage
 
@@ -35,6 +36,7 @@ FIREFLY, AROUND = 20, 3
 LOBE_GUIDES = 3
 # Pixels beyond any frame.
 EVERYTHING = 1 << 20
+
 
 GUIDES = "normal", "albedo", "seen_normal", "depth", "position"
 # Depth and position of the pixels' centres are aliased, and would break thin lines.
@@ -80,10 +82,10 @@ def denoise_picture(
     antialiased, and so have noise to be filtered; None to tell by the normals.
     """
     unit = jnp.nanmean(picture.beauty)
-    averaged: Any = antialiased(picture.normal) if filtered is None else filtered
-    lit = holds_light(picture.albedo, picture.emission, picture.environment)
-    opaque = picture.alpha is None or jnp.all(picture.alpha == 1)
-    images = images_of(picture, clean := cleaned(picture, averaged, unit), lit, opaque)
+    averaged = antialiased(picture.normal) if filtered is None else filtered
+    clean = cleaned(picture, averaged, unit)
+    lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
+    images = images_of(picture, clean, lit)
     layers = images["target"], images["guides"]
     fitted = flr_adaptive(*layers, method, block=block, weight=images["weight"])
     return clean._replace(beauty=composed(fitted, images))
@@ -98,23 +100,22 @@ def cleaned(picture: Picture, averaged: jax.Array | bool, unit: jax.Array) -> Pi
     return jax.tree.map(lambda new, old: jnp.where(averaged, new, old), clean, picture)
 
 
-def images_of(picture: Picture, clean: Picture, lit: Any, opaque: Any) -> Parts:
+def images_of(picture: Picture, clean: Picture, lit: jax.Array) -> Parts:
     """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again.
 
-    lit, opaque: as of `guides.Scene`.
+    lit: as of `holds_light`.
     """
     covered = jnp.ones((1,) * 3) if clean.alpha is None else jnp.clip(clean.alpha, 0, 1)
     surface = jnp.maximum(reflecting(clean, lit), LEAST_ALBEDO * covered)
-    own = own_light(picture, opaque)
-    light = jnp.maximum(picture.beauty - sum(own), 0) / jnp.maximum(surface, 1e-6)
+    light = jnp.maximum(picture.beauty - own_light(picture), 0) / jnp.maximum(surface, 1e-6)
     weight = firefly_weight(light_of(light)) * (covered > LEAST_ALPHA)[..., 0]
     guiding = clean._replace(albedo=jnp.clip(clean.albedo, 0, 1))
     layers = [getattr(guiding, name) for name in GUIDES]
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
-    emitted, behind = own_light(clean, opaque)
-    images |= {"surface": surface, "own": emitted + behind, "alpha": clean.alpha}
-    images |= {"emitted": emitted, "environment": behind}
+    own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
+    images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
+    images |= {"emitted": own[0], "environment": own[1]}
     return images | {"colours": (picture.colours, clean.colours)}
 
 
@@ -134,7 +135,7 @@ class WholePicture(AdaptiveFLR):
 
     name: ClassVar[str] = "picture"
     # A firefly is told from pixels around it, and these are divided by a filtered albedo.
-    margin: ClassVar[int] = AROUND + MARGIN
+    margin: ClassVar[int] = AROUND + FARTHEST
     guides: ClassVar[tuple[str, ...]] = (
         *("normal", "seen_albedo", "seen_normal", "depth", "position"),
     )
@@ -197,9 +198,9 @@ def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
 @functools.partial(jit, static_argnames="filtered")
 def _images(filtered: bool | None, frame: Frame, scene: Scene) -> Parts:
     picture = picture_in(frame, scene)
-    assert scene.averaged is not None and scene.light is not None
+    assert scene.averaged is not None and scene.light is not None and scene.lit is not None
     averaged = scene.averaged if filtered is None else filtered
-    images = images_of(picture, cleaned(picture, averaged, scene.light), scene.lit, scene.opaque)
+    images = images_of(picture, cleaned(picture, averaged, scene.light), scene.lit)
     return images | {"lobes": frame.lobes}
 
 
@@ -225,19 +226,21 @@ def picture_in(frame: Frame, scene: Scene) -> Picture:
     return Picture(**layers)  # type: ignore[arg-type]
 
 
-def own_light(picture: Picture, opaque: Any) -> tuple[jax.Array, jax.Array]:
+def own_light(picture: Picture) -> jax.Array:
     """What no surface reflects and beauty holds, `(H, W, 3)`: emission, and what is behind all."""
-    none = jnp.zeros_like(picture.beauty)
-    emitted, behind = (
-        none if part is None else part for part in (picture.emission, picture.environment)
-    )
-    return emitted, jnp.where(opaque, behind, 0)
+    behind = None if picture.alpha is not None else picture.environment
+    return light_in(picture, picture.emission, behind)
 
 
-def reflecting(picture: Picture, lit: Any) -> jax.Array:
-    """The albedo of what reflects alone, `(H, W, 3)`. lit: as of `guides.Scene`."""
-    emitted, behind = own_light(picture, True)
-    return jnp.maximum(picture.albedo - jnp.where(lit, emitted + behind, 0), 0)
+def reflecting(picture: Picture, lit: jax.Array) -> jax.Array:
+    """The albedo of what reflects alone, `(H, W, 3)`. lit: as of `holds_light`."""
+    own = light_in(picture, picture.emission, picture.environment)
+    return jnp.maximum(picture.albedo - jnp.where(lit, own, 0), 0)
+
+
+def light_in(picture: Picture, *parts: jax.Array | None) -> jax.Array:
+    """The sum of those parts that there are, `(H, W, 3)`."""
+    return sum((part for part in parts if part is not None), jnp.zeros_like(picture.beauty))
 
 
 def filter_picture(picture: Picture, unit: jax.Array) -> Picture:

@@ -63,10 +63,11 @@ def radiance(lobes: np.ndarray, colours: np.ndarray) -> np.ndarray:
 def test_the_layers_of_a_file_make_up_its_beauty(name: str) -> None:
     """In half precision; of both generations of names."""
     frame = read_frame(FOLDER / f"{name}.exr")
-    own = frame.emitted + frame.environment
+    assert (frame.alpha is None) == (name == "blurred")
+    # A transparent film does not show its environment.
+    own = frame.emitted + (frame.environment if frame.alpha is None else 0)
     total = radiance(frame.lobes, frame.lobe_colours) + own
     np.testing.assert_allclose(total, frame.beauty, atol=2e-3 * frame.beauty.max())
-    assert (frame.alpha is None) == (name == "blurred")
     assert frame.lobes.shape == (36, 64, 18) and not frame.single
     assert np.all(frame.seen_albedo >= 0) and frame.seen_normal.shape == (36, 64, 3)
 
@@ -112,32 +113,27 @@ def test_one_sample_per_pixel_takes_larger_blocks(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_there_is_less_noise_and_no_less_light(cutout: Frame, clean: tuple) -> None:
-    """Nobody is warned that there is no ambient occlusion, which Cycles has none of."""
-    picture, noisy = clean[0][..., :3], cutout.beauty
-    assert np.all(np.isfinite(picture)) and np.all(picture >= 0)
-    ripple = lambda image: np.mean(np.abs(np.diff(image, 2, axis=1)))
-    assert ripple(picture) < 0.6 * ripple(noisy)
-    assert abs(np.mean(picture) / np.mean(noisy) - 1) < 0.05
-
-
-def test_alpha_stays_where_it_is_and_gets_smoother(cutout: Frame, clean: tuple) -> None:
-    alpha, noisy = clean[0][..., 3:], cutout.alpha
-    assert np.all((alpha >= 0) & (alpha <= 1))
-    inside = np.pad(noisy[..., 0], 4, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(inside, (9, 9))
-    for value in (0, 1):
-        far = np.all(windows == value, axis=(2, 3))
-        assert far.any()
-        np.testing.assert_allclose(alpha[far], value, atol=1e-6)
-    assert np.sum(np.abs(np.diff(alpha, axis=1))) < np.sum(np.abs(np.diff(noisy, axis=1)))
+def test_picture_and_alpha_come_nearer_to_what_they_would_converge_to(
+    cutout: Frame, clean: tuple
+) -> None:
+    """Against 1024 samples. Nobody is warned that Cycles has no ambient occlusion."""
+    channels = exr.read_channels(FOLDER / "cutout_reference.exr")
+    reference = np.stack([np.float32(channels[c]) for c in "RGBA"], axis=-1)
+    noisy = np.concatenate([cutout.beauty, cutout.alpha], axis=-1)
+    assert np.all(np.isfinite(clean[0])) and np.all(clean[0] >= 0) and np.all(clean[0][..., 3] <= 1)
+    assert abs(np.mean(clean[0][..., :3]) / np.mean(cutout.beauty) - 1) < 0.05
+    shown = [np.clip(image, 0, 1) ** (1 / 2.2) for image in (noisy, clean[0], reference)]
+    before, after = (np.mean((x - shown[2]) ** 2, axis=(0, 1)) for x in shown[:2])
+    print(before, after)
+    assert np.all(after[:3] < 0.4 * before[:3])
+    assert after[3] < before[3]
 
 
 def test_passes_sum_to_the_picture(cutout: Frame, clean: tuple) -> None:
     picture, passes = clean[0][..., :3], clean[1]
     n = cutout.lobes.shape[-1]
     lobes, colours, own = np.split(passes, [n, n + n // 2], axis=-1)
-    total = radiance(lobes, colours) + own[..., :3] + own[..., 3:]
+    total = radiance(lobes, colours) + own[..., :3]  # the film is transparent
     np.testing.assert_allclose(total, picture, atol=1e-5 * picture.max())
     assert np.all(passes >= 0)
     # Each keeps about the light that it had: to as much as edges of colours change it.
@@ -212,10 +208,8 @@ def test_the_command_writes_a_file_that_takes_the_inputs_place(
     for name in set(given) - {*passes, *(view + c for c in "RGBA")}:
         np.testing.assert_array_equal(made[name], given[name])
     again = read_frame(out)
-    total = radiance(again.lobes, again.lobe_colours) + again.emitted + again.environment
-    behind = (again.alpha < 1) * np.float32(1)
-    error = (total - again.beauty) * (1 - behind)
-    np.testing.assert_allclose(error, 0, atol=1e-5 * again.beauty.max())
+    total = radiance(again.lobes, again.lobe_colours) + again.emitted
+    np.testing.assert_allclose(total, again.beauty, atol=1e-5 * again.beauty.max())
 
 
 def test_info_says_what_is_denoised(capsys: pytest.CaptureFixture[str]) -> None:
