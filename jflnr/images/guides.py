@@ -58,13 +58,13 @@ def scene_of(frame: Frame) -> Scene:
 def scene_from(sample: Frame, middle: Array | None) -> Scene:
     """That of a frame of which every so many pixels are given, and the position in its middle."""
     xp: Any = sample.depth.__array_namespace__()
-    middle = xp.zeros(3) if middle is None else xp.nan_to_num(middle)
+    middle = xp.zeros(3, xp.float32) if middle is None else xp.nan_to_num(middle)
     scene = Scene(typical_depth(sample.depth, sample.mask), middle)
     if sample.beauty is None:
         return scene
     light = xp.nanmean(xp.asarray(sample.beauty, dtype=xp.float32))
     own = [layer for layer in (sample.emitted, sample.environment) if layer is not None]
-    lit = holds_light(sample.seen_albedo, sum(own, xp.zeros(sample.beauty.shape)))
+    lit = holds_light(sample.seen_albedo, sum(own, xp.zeros_like(light)))
     return Scene(*scene[:2], light, antialiased(sample.normal), lit)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from jflnr.frame import Array
 from jflnr.lazy import jax, jnp
 
 # How far neighbours may differ, one standard deviation: normals, and depth as a share of itself.
@@ -56,7 +55,7 @@ def _likeness(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
     return jnp.nan_to_num(jnp.exp(-(turn / NORMAL**2 + step**2) / 2))
 
 
-def antialiased(normal: Array) -> Array:
+def antialiased(normal: Any) -> Any:
     """Whether pixels hold a mean of several normals, `()`; those of a rasteriser hold one.
 
     A single sample anywhere in the pixel is not told from one at its centre. normal: `(H, W, 3)`,
@@ -67,7 +66,7 @@ def antialiased(normal: Array) -> Array:
     return xp.mean((length > 1 - SHORT) & (length < SHORT)) > SHARE
 
 
-def holds_light(albedo: Array, own: Array) -> Array:
+def holds_light(albedo: Any, own: Any) -> Any:
     """Whether an albedo has emission and environment added to it, `()`. own: these, `(H, W, 3)`."""
     xp: Any = albedo.__array_namespace__()
     return xp.all(~(albedo < (1 - ROUNDING) * own - ROUNDING))

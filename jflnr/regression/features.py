@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-
 from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.moments import planes
 from jflnr.regression.strips import ROWS, fill

@@ -13,12 +13,11 @@ import functools
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-
-from jflnr.lazy import jax, jit, jnp, lax, pytree
 from jflnr.frame import Frame
 from jflnr.images.guides import FAR, Scene, draw_near, scene_of
 from jflnr.images.inputs import same_size
 from jflnr.images.noisy_guides import antialiased, holds_light
+from jflnr.lazy import jax, jit, jnp, lax, pytree
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
 from jflnr.regression.features import FARTHEST, coverage, filter_features
 from jflnr.regression.lobes import split
