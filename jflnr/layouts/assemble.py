@@ -125,11 +125,15 @@ def _picture(images: Layers, given: Layers, opaque: bool | None) -> Layers:
     if environment is None and alpha is None:
         environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
     seen = images["seen_albedo"]
+    if seen is None and given["albedo"] is not None:
+        # Mirrors and glass, whose diffuse albedo is 0, take the albedo of what is seen in them for 1.
+        bare = (given["albedo"] <= DARK).all(axis=-1, keepdims=True) & (images["depth"] > 0)
+        seen = np.where(bare, np.float32(1), given["albedo"])
     return {
         "emitted": given["emission"],
         "environment": environment,
         "alpha": alpha,
-        "seen_albedo": given["albedo"] if seen is None else seen,
+        "seen_albedo": seen,
     }
 
 
