@@ -11,12 +11,15 @@ from typing import NoReturn
 # How long the main thread may take to stop by itself, in seconds.
 PATIENCE = 1.0
 INTERRUPTED = 130
+# Bytes of compiled programs that are kept; the oldest go first.
+PROGRAMS = 1 << 28
 
 
 def main() -> int:
     """Run the process's own command line and return its exit code."""
     _open_streams()
     _watch()
+    _keep_programs()
     try:
         from jflnr.cli import main as run
 
@@ -36,6 +39,20 @@ def _open_streams() -> None:
             if nowhere != number:
                 os.dup2(nowhere, number)
             setattr(sys, name, open(number, "w" if number else "r", closefd=False))
+
+
+def _keep_programs() -> None:
+    """Let JAX keep what it compiles for later runs, unless its own variables say otherwise.
+
+    Half a minute becomes a few seconds. What XLA says of each program it loads is not for users.
+    """
+    import platformdirs
+
+    kept = os.path.join(platformdirs.user_cache_dir("jflnr"), "jax")
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", kept)
+    os.environ.setdefault("JAX_COMPILATION_CACHE_MAX_SIZE", str(PROGRAMS))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
 
 def _watch() -> None:

@@ -7,7 +7,6 @@ against `albedo * reference`; rMSE, SMAPE and the squared errors on that radianc
 from typing import Any
 
 import numpy as np
-from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
@@ -86,6 +85,10 @@ def compare(picture: Array, reference: Array) -> dict[str, float | None]:
 
 def psnr(picture: np.ndarray, reference: np.ndarray) -> float:
     """Peak signal-to-noise ratio in dB of two displayed pictures; infinite if they are equal."""
+    from skimage.metrics import (
+        peak_signal_noise_ratio,
+    )  # takes most of a second, with what it needs
+
     with np.errstate(divide="ignore"):
         return float(peak_signal_noise_ratio(reference, picture, data_range=1))
 
@@ -94,6 +97,8 @@ def ssim(picture: np.ndarray, reference: np.ndarray) -> float | None:
     """Structural similarity of two displayed pictures; None below its window of 7 x 7 pixels."""
     if min(picture.shape[:2]) < 7:
         return None
+    from skimage.metrics import structural_similarity
+
     return float(structural_similarity(reference, picture, data_range=1, channel_axis=-1))
 
 

@@ -69,6 +69,28 @@ def test_help_and_info_do_not_import_jax(frame_file: Path) -> None:
         assert done.stdout.splitlines()[-1] == "False", done
 
 
+def test_a_run_keeps_its_programs_for_the_next(frame_file: Path, tmp_path: Path) -> None:
+    """And waits for no metrics that nobody asked for."""
+    code = (
+        "import sys; from jflnr.__main__ import main; main(); print('scipy.stats' in sys.modules)"
+    )
+    own = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
+    command = [sys.executable, "-c", code, "denoise", str(frame_file), "--overwrite", "-o"]
+    kept = list[set[Path]]()
+    for _ in range(2):
+        done = subprocess.run(
+            [*command, str(tmp_path / "out.exr")],
+            env=own
+            | {"XDG_CACHE_HOME": str(tmp_path), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"},
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.stdout.splitlines()[-1] == "False" and done.stderr == "", done
+        kept.append(set((tmp_path / "jflnr" / "jax").glob("*-cache")))
+    assert kept[0] and kept[1] == kept[0]
+
+
 def test_a_closed_pipe_is_no_error(frame_file: Path) -> None:
     code = f"{sys.executable} -m jflnr info {frame_file} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", code], capture_output=True, text=True, timeout=120)
