@@ -9,7 +9,8 @@ A method is a frozen dataclass, a pytree: its numbers are leaves, its options ar
 - `known(images)`: what is known of the whole frame from a sparse grid of its pixels;
 - `stages()`: what it does (`jflnr.stages`).
 
-- `features`: the layers that it reads, if they are its own; else users choose guides.
+- `features`: the layers that it reads, if they are its own, and `guides`, those of them that are
+  guides, if not all are; else users choose guides.
 
 Drivers run any such method: whole, in tiles and over time. In place of stages, a method whose
 frames cannot be cut has `denoise(inputs, names)`, and one with a history of its own `start(frame)`

@@ -124,12 +124,17 @@ def _picture(images: Layers, given: Layers, opaque: bool | None) -> Layers:
         alpha = None
     if environment is None and alpha is None:
         environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
-    seen = images["seen_albedo"]
+    seen, albedo, depth = images["seen_albedo"], given["albedo"], images["depth"]
+    assert albedo is not None and depth is not None
+    if seen is None:
+        # What mirrors and glass reflect, which have no diffuse albedo, is divided by 1.
+        bare = (albedo <= DARK).all(axis=-1, keepdims=True) & (depth > 0)
+        seen = np.where(bare, np.float32(1), albedo)
     return {
         "emitted": given["emission"],
         "environment": environment,
         "alpha": alpha,
-        "seen_albedo": given["albedo"] if seen is None else seen,
+        "seen_albedo": seen,
     }
 
 
