@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import os
 from collections.abc import Callable, Sequence
@@ -67,13 +68,12 @@ def made_up(length: int = 10, height: int = 48, width: int = 80) -> Shot:
     frames = []
     for i in range(length):
         rows, columns = slice(90, 90 + height), slice(150 + 2 * i, 150 + 2 * i + width)
-        layers: dict[str, Any] = {
-            k: None if v is None else v[rows, columns] for k, v in vars(whole).items()
-        }
-        light = np.asarray(layers["reference"])
+        part = whole.map(lambda layer: layer[rows, columns])  # noqa: B023
+        light = np.asarray(part.reference)
         noise = np.random.default_rng(i).gamma(0.2, 5, (height, width, 1))
         motion = np.full((height, width, 2), (2, 0), np.float32) * (i > 0)
-        frames.append(Frame(**layers | {"indirect": np.float32(light * noise), "motion": motion}))
+        noisy = (light * noise).astype(np.float32)
+        frames.append(dataclasses.replace(part, indirect=noisy, motion=motion))
     return Shot("made up", "room", "camera", "train", tuple(frames))
 
 

@@ -56,12 +56,15 @@ class Frame:
     # Whether its file says that it is of one sample per pixel, in which every layer is noise.
     single: bool = field(default=False, metadata={"static": True})
 
+    def layers(self) -> dict[str, Array]:
+        """Those that there are, by name."""
+        names = (each.name for each in dataclasses.fields(self) if not each.metadata.get("static"))
+        return {name: layer for name in names if (layer := getattr(self, name)) is not None}
+
     def map(self, change: Callable[[Array], Array]) -> Frame:
         """The frame with every layer changed."""
-        names = (each.name for each in dataclasses.fields(self) if not each.metadata.get("static"))
-        layers = {name: getattr(self, name) for name in names}
-        there = {name: change(layer) for name, layer in layers.items() if layer is not None}
-        return dataclasses.replace(self, **there)  # type: ignore[arg-type]
+        changed = {name: change(layer) for name, layer in self.layers().items()}
+        return dataclasses.replace(self, **changed)  # type: ignore[arg-type]
 
 
 def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | None = None) -> Frame:
@@ -123,7 +126,7 @@ def composite(frame: Frame, indirect: Array) -> Array:
 def not_finite(frame: Frame) -> dict[str, int]:
     """How many pixels of each layer hold a NaN or an infinity, for the layers that have any."""
     counts = {}
-    for name, image in vars(frame).items():
-        if name != "single" and image is not None and not (finite := np.isfinite(image)).all():
+    for name, image in frame.layers().items():
+        if not (finite := np.isfinite(image)).all():
             counts[name] = int((~finite.all(axis=-1)).sum())
     return counts

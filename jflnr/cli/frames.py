@@ -172,7 +172,7 @@ class Worker:
                 f"{job.source}: --reference needs a layer reference, and there is none for what "
                 f"{method.name} denoises"
             )
-        shapes = tuple(getattr(image, "shape", None) for image in vars(frame).values())
+        shapes = tuple((name, image.shape) for name, image in frame.layers().items())
         times = [time.perf_counter()]
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", UserWarning)

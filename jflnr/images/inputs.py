@@ -61,17 +61,15 @@ def warn_without_ao(frame: Frame, guides: Sequence[str] | None, method: Any) -> 
 
 def frame_inputs(frame: Frame, names: Sequence[str]) -> Frame:
     """The frame reduced to the layers that denoising reads, so that others cost nothing."""
-    needed = {"indirect", "normal", "depth", "mask", "single", *names}
-    unused = {field.name: None for field in dataclasses.fields(Frame) if field.name not in needed}
-    return dataclasses.replace(frame, **unused)  # type: ignore[arg-type]
+    unused = frame.layers().keys() - {"indirect", "normal", "depth", "mask", *names}
+    return dataclasses.replace(frame, **dict.fromkeys(unused))  # type: ignore[arg-type]
 
 
 def _check_sizes(frame: Frame) -> None:
-    others = ("indirect", "single")
-    layers = {name: layer for name, layer in vars(frame).items() if name not in others}
+    layers = {"normal": frame.normal, "depth": frame.depth} | frame.layers()
+    layers.pop("indirect", None)
     for name, layer in layers.items():
-        if layer is not None or name in ("normal", "depth"):
-            checks.image(name, layer, CHANNELS.get(name, 3))
+        checks.image(name, layer, CHANNELS.get(name, 3))
     checks.same_size(**layers)
     checks.image("indirect", frame.indirect)
     (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]

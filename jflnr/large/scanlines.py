@@ -82,7 +82,7 @@ class Scanlines:
 
         def read(start: int, stop: int) -> Frame:
             found = frame_of(self.part(start, stop, layers))
-            other = {name for name in vars(found) if name not in (*layers, "single")}
+            other = found.layers().keys() - set(layers)
             return dataclasses.replace(found, **dict.fromkeys(other))  # type: ignore[arg-type]
 
         return Rows(self.height, self.width, read)
