@@ -67,7 +67,7 @@ def fit(
     """Minimise the mean error of the reflected light against the references with L-BFGS.
 
     The error is SMAPE for `flr`; for `flr-adaptive`, which one setting has to serve at all sample
-    counts, the one that FLNR is trained with (`jflnr.network.loss.shown_error`).
+    counts, decibels of the displayed picture (`jflnr.network.loss.shown_error`).
 
     frames: with a reference each; they may differ in size. method: `flr`, `flr-adaptive` or one of
     these as an object, whose numbers are where to start. guides: as for `denoise`; all frames must

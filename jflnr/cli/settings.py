@@ -17,8 +17,9 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     name = arguments.method
     if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
         name = DEFAULT
-    if arguments.error_map and (name not in ("flr-adaptive", WHOLE) or arguments.backend != "jax"):
-        raise ValueError(f"--error-map needs --method flr-adaptive or {WHOLE} on the jax backend")
+    told = ("flr-adaptive", "flnr", "flnr-small", WHOLE)
+    if arguments.error_map and (name not in told or arguments.backend != "jax"):
+        raise ValueError(f"--error-map needs --method {', '.join(told)}, on the jax backend")
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
     if arguments.explain and name != "auto":
