@@ -42,7 +42,11 @@ def made_up(count: int, brightness: float = 1) -> list[jflnr.Frame]:
         y, x = np.mgrid[:height, :width].astype(np.float32)[..., None] / 32
         noise = rng.exponential(brightness, (height, width, 3)).astype(np.float32)
         normal = np.concatenate([np.sin(x), np.sin(y), 1 + 0 * x], axis=-1)
-        frames.append(jflnr.Frame(indirect=noise, normal=normal, depth=2 + x + y, ao=0.5 + 0 * x))
+        frames.append(
+            jflnr.Frame(
+                indirect=noise, albedo=0 * noise + 1, normal=normal, depth=2 + x + y, ao=0.5 + 0 * x
+            )
+        )
     return frames
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import jflnr
+from jflnr.images.noisy_guides import holds_light
 from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.picture import Picture, denoise_picture, holds_light, reflecting
+from jflnr.regression.picture import Picture, denoise_picture, reflecting
 
 FEW = AdaptiveFLR(levels=2)
 
@@ -75,10 +76,9 @@ def test_light_that_the_albedo_holds_is_taken_from_it(rng, film):
     own = {name: np.repeat(layer, 3, axis=-1) for name, layer in own.items()}
     plain = picture._replace(alpha=np.float32(share) if film else None, **own)
     added = plain._replace(albedo=plain.albedo + own["emission"] + own["environment"])
-    assert holds_light(added)
-    assert not holds_light(plain)
-    for one in (plain, added):
-        reflected = reflecting(one, holds_light(one))
+    for one, lit in ((plain, False), (added, True)):
+        assert holds_light(one.albedo, own["emission"] + own["environment"]) == lit
+        reflected = reflecting(one, lit)
         np.testing.assert_allclose(reflected, picture.albedo, atol=1e-5)
 
 
