@@ -106,9 +106,9 @@ def test_one_method_is_the_default_everywhere(still: Frame) -> None:
     from jflnr.cli.settings import settings_of
 
     named = method_of()
-    assert jflnr.Denoiser().method == named
+    assert jflnr.Denoiser().method_for(still) == named
     arguments = parser().parse_args(["denoise", "a.exr", "-o", "b.exr"])
-    assert settings_of(arguments)["method"] == named
+    assert jflnr.Denoiser(**settings_of(arguments)).method_for(still) == named
     image = temporal.step(temporal.start(still), still)[1]
     np.testing.assert_array_equal(image, temporal.step(temporal.start(still), still, named)[1])
     np.testing.assert_array_equal(jflnr.denoise(still), jflnr.denoise(still, named))

@@ -93,7 +93,7 @@ class FLNR(AdaptiveFLR):
         side = self.finest
         *before, fits, _ = AdaptiveFLR.stages(dataclasses.replace(self, keep_energy=False))
         given = tuple(name for name, _ in fits.gives)
-        scales = unet.scales_of(self.params)
+        scales = unet.scales_of(self.ready(5, COLOURS).params)
         gives = (("image", 0), *([("error", 0)] if self.with_error else []))
         return (
             *before,
