@@ -20,8 +20,8 @@ REACH, WIDTH = 3, 2.0
 # How far features may differ, one standard deviation, where they vary by about 1: by their
 # gradients, and blurred, where two that 4 samples tell differ by 0.14 with noise alone.
 ALIKE, NEAR = 0.15, 0.3
-# How many pixels away a filtered one looks: over its window and that of `coverage`, and seven times at
-# the next pixel, for blurs and gradients.
+# How many pixels away a filtered one looks: over its window and that of `coverage`, and seven
+# times at the next pixel, for blurs and gradients.
 FARTHEST = 2 * REACH + 7
 
 

@@ -137,7 +137,7 @@ def test_what_is_no_size_is_named(text):
         memory.parse(text)
 
 
-@pytest.mark.parametrize(("method", "gigabytes"), [("flr", 4), ("flr-adaptive", 4), ("flnr", 12)])
+@pytest.mark.parametrize(("method", "gigabytes"), [("flr", 4), ("flr-adaptive", 4), ("flnr", 24)])
 def test_larger_frames_come_in_smaller_pieces(method, gigabytes):
     gigabyte = 1 << 30
     tile_for = functools.partial(memory.tile_for, at_once=1, method=method_of(method))
