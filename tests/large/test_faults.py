@@ -61,8 +61,9 @@ def test_pieces_are_the_whole(
     wanted, found = map(exr.read_channels, outputs)
     assert found.keys() == wanted.keys()
     for name, pixels in wanted.items():
-        # Fits of 13 guides to 40 x 24 pixels make more of rounding.
-        np.testing.assert_allclose(found[name], pixels, rtol=2e-3, atol=1e-5)
+        # Fits of 13 guides to 40 x 24 pixels make more of rounding, in a single piece too.
+        most = 2e-3 if whole["method"] == "picture" else 1e-4
+        np.testing.assert_allclose(found[name], pixels, rtol=most, atol=1e-5)
     first, second = (exr.read_attributes(output) for output in outputs)
     assert read_header(outputs[0]) == read_header(outputs[1])
     assert first._replace(others={}) == second._replace(others={})
