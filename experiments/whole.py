@@ -13,7 +13,7 @@ from jflnr.exr import read_channels
 from jflnr.frame import Array
 from jflnr.images.guides import draw_near, typical_depth
 from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
-from jflnr.regression.picture import BLOCK, Picture, denoise_picture
+from jflnr.regression.picture import Picture, denoise_picture
 
 NAME = "whole"
 QUESTION = "How near does a whole picture come to Open Image Denoise?"
@@ -102,11 +102,10 @@ def images(picture: Picture, spp: int) -> dict[str, Array]:
     """Noisy, ours, and OIDN with auxiliaries as they are and prefiltered."""
     albedo, normal = np.clip(picture.albedo, 0, 1), picture.seen_normal
     clean = (oidn(albedo=albedo), oidn(normal=normal))
-    denoise = jax.jit(denoise_picture, static_argnames=("filtered", "block"))
-    block = 4 if spp == 1 else BLOCK
+    denoise = jax.jit(denoise_picture)
     return {
         "noisy": picture.beauty,
-        "ours": np.asarray(denoise(picture, filtered=True, block=block).beauty),
+        "ours": np.asarray(denoise(picture, samples=float(spp)).beauty),
         "raw": oidn(color=picture.beauty, albedo=albedo, normal=normal),
         "clean": oidn(color=picture.beauty, albedo=clean[0], normal=clean[1], cleanAux=True),
     }

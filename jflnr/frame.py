@@ -53,18 +53,18 @@ class Frame:
     seen_normal: Array | None = None  # (H, W, 3) likewise
     lobes: Array | None = None  # (H, W, 6 n) direct and indirect light of n kinds of surfaces
     lobe_colours: Array | None = None  # (H, W, 3 n) what that is to be multiplied by
-    # Whether its file says that it is of one sample per pixel, in which every layer is noise.
-    single: bool = field(default=False, metadata={"static": True})
+    # Samples per pixel that all layers of a whole picture are means of; None where nobody says.
+    samples: Any = field(default=None, metadata={"layer": False})
 
     def layers(self) -> dict[str, Array]:
         """Those that there are, by name."""
-        names = (each.name for each in dataclasses.fields(self) if not each.metadata.get("static"))
+        names = (each.name for each in dataclasses.fields(self) if not each.metadata)
         return {name: layer for name in names if (layer := getattr(self, name)) is not None}
 
     def map(self, change: Callable[[Array], Array]) -> Frame:
         """The frame with every layer changed."""
         changed = {name: change(layer) for name, layer in self.layers().items()}
-        return dataclasses.replace(self, **changed)  # type: ignore[arg-type]
+        return dataclasses.replace(self, **changed)
 
 
 def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | None = None) -> Frame:
@@ -82,7 +82,9 @@ def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | Non
 
 def frame_of(source: layouts.Source) -> Frame:
     """The frame in a file that `layouts.load` read; raises as `read_frame` does."""
-    return Frame(**layouts.assemble(source), single=layouts.samples(source) == 1)  # type: ignore[arg-type]
+    told = layouts.samples(source)
+    samples = None if told is None else np.float32(told)
+    return Frame(**layouts.assemble(source), samples=samples)  # type: ignore[arg-type]
 
 
 def read_header(path: exr.PathLike) -> dict:

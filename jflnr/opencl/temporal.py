@@ -76,9 +76,11 @@ def step(
     fitted = twins.regress(method, images, context, composed=False, on_device=True)
     image, _ = accumulate(context, image, change, fitted, covered, least[1])
     result: Any = image.mean
+    averaged: Any = light.mean
     context.finish(result, result)
     state = State(surface, light, image, evidence)
-    if (picture := compose(method, given | {"image": result.get()})) is not None:
+    averages = {"target": averaged.get(), "image": result.get()}
+    if (picture := compose(method, given | averages)) is not None:
         return state, context.array(np.asarray(picture)) if on_device else np.asarray(picture)
     return state, result if on_device else result.get()
 

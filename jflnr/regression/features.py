@@ -17,54 +17,73 @@ from jflnr.regression.strips import ROWS, fill
 
 # Pixels on each side of a window of 7 x 7, and the standard deviation of its weights.
 REACH, WIDTH = 3, 2.0
-# How far features may differ, one standard deviation, where they vary by about 1: by their
-# gradients, and blurred, where two that 4 samples tell differ by 0.14 with noise alone.
-ALIKE, NEAR = 0.15, 0.3
+# How far features may differ by their gradients, one standard deviation, where they vary by about
+# 1: the variance with one sample per pixel, which falls with their number, and with all of them.
+# Blurred they may differ by so many times that.
+VARIANCE, LEAST, NEAR = 0.085, 0.0025, 2.5
+# Of a picture that does not say how many it is made of.
+SAMPLES = 4
 # How many pixels away a filtered one looks: over its window and that of `coverage`, and seven
 # times at the next pixel, for blurs and gradients.
 FARTHEST = 2 * REACH + 7
 
 
 def filter_features(
-    steering: Sequence[jax.Array], following: Sequence[jax.Array]
+    steering: Sequence[jax.Array],
+    following: Sequence[jax.Array],
+    samples: jax.Array | float = SAMPLES,
 ) -> tuple[jax.Array, ...]:
     """Features averaged along the edges that they share.
 
     steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
     following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
     finite in either is left out of the averages, and gets that of its neighbours.
+    samples: per pixel, that either is made of.
     Returns the features of `following`.
     """
     steer, follow = jnp.stack(planes(tuple(steering))), jnp.stack(planes(tuple(following)))
     usable = jnp.all(jnp.isfinite(steer), axis=0) & jnp.all(jnp.isfinite(follow), axis=0)
-    near = blur(jnp.where(usable, steer, 0))
-    sums = _average(near, jnp.where(usable, follow, 0), usable.astype(follow.dtype))
-    filtered = jnp.moveaxis(sums[1:] / jnp.maximum(sums[:1], 1e-12), 0, -1)
+    alike = jnp.sqrt(VARIANCE / jnp.maximum(samples, 1) + LEAST)
+    _, filtered = average(jnp.where(usable, steer, 0), follow, usable, alike)
+    filtered = jnp.moveaxis(filtered, 0, -1)
     ends = [layer.shape[-1] for layer in following]
     return tuple(filtered[..., sum(ends[:i]) : sum(ends[: i + 1])] for i in range(len(ends)))
 
 
-def _average(near: jax.Array, follow: jax.Array, usable: jax.Array) -> jax.Array:
-    """Sums of the weights and of the weighted planes over each window, `(1 + K, H, W)`.
+def average(
+    steer: jax.Array, follow: jax.Array, usable: jax.Array, alike: jax.Array | float
+) -> tuple[jax.Array, jax.Array]:
+    """Planes averaged along the edges of others.
 
-    near: `(S, H, W)`, what must be alike. follow: `(K, H, W)`. usable: `(H, W)`, 0 or 1.
+    steer: `(S, H, W)`, what tells the edges. follow: `(K, H, W)`. usable: `(H, W)`, which pixels
+    count. alike: how far `steer` may differ, one standard deviation.
+    Returns how many pixels of equal weight tell as much, `(H, W)`, and the averages, `(K, H, W)`; 0
+    where no pixel counts.
     """
     margin = ((0, 0), (REACH, REACH), (REACH, REACH))
-    there = jnp.concatenate([usable[None], follow])
     # Outside nothing is usable.
-    padded = [jnp.pad(a, margin) for a in (near / NEAR, there)]
-    padded, steepness = lax.optimization_barrier((padded, structure(near) / ALIKE**2))
+    there = jnp.where(usable, jnp.concatenate([jnp.ones_like(follow[:1]), follow]), 0)
+    near = blur(steer)
+    padded = [jnp.pad(a, margin) for a in (near / (NEAR * alike), there)]
+    padded, steepness = lax.optimization_barrier((padded, structure(near) / alike**2))
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
         around = rows + 2 * REACH
-        alike, values = (lax.dynamic_slice_in_dim(a, first, around, axis=1) for a in padded)
-        return _windows(alike, values, lax.dynamic_slice_in_dim(steepness, first, rows, axis=1))
+        likeness, values = (lax.dynamic_slice_in_dim(a, first, around, axis=1) for a in padded)
+        return _windows(likeness, values, lax.dynamic_slice_in_dim(steepness, first, rows, axis=1))
 
-    return fill(jnp.zeros_like(there), 1, usable.shape[0], 1, ROWS, strip)
+    sums = jnp.zeros((1 + len(there), *usable.shape), there.dtype)
+    sums = fill(sums, 1, usable.shape[0], 1, ROWS, strip)
+    squares, total = jnp.maximum(sums[:2], 1e-12)
+    return total**2 / squares, sums[2:] / total
 
 
 def _windows(near: jax.Array, there: jax.Array, steepness: jax.Array) -> jax.Array:
-    """As `_average`, of some rows with their margins, both images with what is usable."""
+    """Sums of squared weights, of weights and of weighted planes over each window.
+
+    near: what must be alike, of some rows with their margins. there: likewise, what is averaged,
+    behind what is usable. steepness: `(3, h, W)`, of the rows. Returns `(2 + K, h, W)`.
+    """
     height, width = steepness.shape[1:]
     side = 2 * REACH + 1
     here = near[:, REACH : REACH + height, REACH : REACH + width]
@@ -77,9 +96,12 @@ def _windows(near: jax.Array, there: jax.Array, steepness: jax.Array) -> jax.Arr
         y, x = i - REACH, j - REACH
         across = y * y * steepness[0] + 2 * y * x * steepness[1] + x * x * steepness[2]
         apart = across + (y * y + x * x) / WIDTH**2 + jnp.sum((other - here) ** 2, axis=0)
-        return total + jnp.exp(-apart / 2) * values
+        weighted = jnp.exp(-apart / 2) * values
+        squared = jnp.exp(-apart) * values[:1]
+        return total + jnp.concatenate([squared, weighted])
 
-    return lax.fori_loop(0, side**2, add, jnp.zeros((len(there), height, width), there.dtype))
+    empty = jnp.zeros((1 + len(there), height, width), there.dtype)
+    return lax.fori_loop(0, side**2, add, empty)
 
 
 def structure(image: jax.Array) -> jax.Array:

@@ -8,8 +8,6 @@ filtered as features are.
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -19,12 +17,14 @@ from jflnr.images.inputs import same_size
 from jflnr.images.noisy_guides import antialiased, holds_light
 from jflnr.lazy import jax, jit, jnp, lax, pytree
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
-from jflnr.regression.features import FARTHEST, coverage, filter_features
+from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
+from jflnr.regression.detail import REACH, find_detail
+from jflnr.regression.features import FARTHEST, SAMPLES, coverage, filter_features
 from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage
 
-# Side in pixels of the blocks of the first pass, with 2 samples per pixel and more, and with one.
-BLOCK, BLOCK_OF_ONE = 2, 4
+# Side in pixels of the blocks of the first pass.
+BLOCK = 2
 # Darker surfaces are not divided by their albedo, which is hardly known.
 LEAST_ALBEDO = 0.02
 # Of what covers less of a pixel too little is known to learn from it.
@@ -71,38 +71,42 @@ def denoise_picture(
     method: AdaptiveFLR = DEFAULT,
     *,
     block: int = BLOCK,
-    filtered: bool | None = None,
+    samples: jax.Array | float | None = None,
 ) -> Picture:
     """The picture without noise: beauty, and filtered every layer that came with it.
 
     Scales with beauty, emission and environment. No light is negative.
 
-    method: constants of the fit. block: as of `AdaptiveFLR`. filtered: whether the layers are
-    antialiased, and so have noise to be filtered; None to tell by the normals.
+    method: constants of the fit. block: as of `AdaptiveFLR`. samples: per pixel, of all layers; if
+    None it is told by the normals whether layers are antialiased, and so have noise.
     """
     unit = jnp.nanmean(picture.beauty)
-    averaged = antialiased(picture.normal) if filtered is None else filtered
-    clean = cleaned(picture, averaged, unit)
+    clean = cleaned(picture, unit, samples, antialiased(picture.normal))
     lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
-    images = images_of(picture, clean, lit)
+    images = images_of(picture, clean, unit, lit)
     layers = images["target"], images["guides"]
     fitted = flr_adaptive(*layers, method, block=block, weight=images["weight"])
-    return clean._replace(beauty=composed(fitted, images))
+    return clean._replace(beauty=composed(images | {"image": fitted}))
 
 
-def cleaned(picture: Picture, averaged: jax.Array | bool, unit: jax.Array) -> Picture:
-    """The picture with layers that are free of noise. averaged: whether they are means of several
-    samples, and so have any. unit: brightness of the picture, `()`."""
-    if averaged is False:
-        return picture
-    clean = filter_picture(picture, unit)
+def cleaned(
+    picture: Picture, unit: jax.Array, samples: jax.Array | float | None, averaged: jax.Array
+) -> Picture:
+    """The picture with layers that are free of noise.
+
+    unit: brightness of the picture, `()`. samples: per pixel; if None, averaged says whether the
+    layers are means of several, and so have noise.
+    """
+    if samples is not None:
+        return filter_picture(picture, unit, samples)
+    clean = filter_picture(picture, unit, SAMPLES)
     return jax.tree.map(lambda new, old: jnp.where(averaged, new, old), clean, picture)
 
 
-def images_of(picture: Picture, clean: Picture, lit: jax.Array) -> Parts:
+def images_of(picture: Picture, clean: Picture, unit: jax.Array, lit: jax.Array) -> Parts:
     """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again.
 
-    lit: as of `holds_light`.
+    unit: brightness of the picture, `()`. lit: as of `holds_light`.
     """
     covered = jnp.ones((1,) * 3) if clean.alpha is None else jnp.clip(clean.alpha, 0, 1)
     surface = jnp.maximum(reflecting(clean, lit), LEAST_ALBEDO * covered)
@@ -114,13 +118,23 @@ def images_of(picture: Picture, clean: Picture, lit: jax.Array) -> Parts:
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
     own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
     images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
+    # By rows, as parts of a frame are.
+    images |= {"brightness": jnp.broadcast_to(unit, (len(light), 1, 1))}
     images |= {"emitted": own[0], "environment": own[1]}
     return images | {"colours": (picture.colours, clean.colours)}
 
 
-def composed(light: jax.Array, images: Parts) -> jax.Array:
-    """The picture `(H, W, 3)` from light without noise."""
-    return jnp.maximum(light, 0) * images["surface"] + images["own"]
+def composed(images: Parts) -> jax.Array:
+    """The picture `(H, W, 3)` from `image`, its light without noise, with its detail.
+
+    It is nowhere darker than what is emitted and seen of the environment.
+    """
+    noisy, fitted = (
+        jnp.maximum(images[light], 0) * images["surface"] + images["own"]
+        for light in ("target", "image")
+    )
+    detail = find_detail(noisy, fitted, images["weight"], images["brightness"])
+    return jnp.maximum(fitted + detail, images["own"])
 
 
 @pytree
@@ -128,8 +142,8 @@ def composed(light: jax.Array, images: Parts) -> jax.Array:
 class WholePicture(AdaptiveFLR):
     """The method: adaptive FLR of what the surfaces of a picture reflect and transmit.
 
-    filtered: as of `denoise_picture`. lobes: give the light passes too. The rest is of
-    `AdaptiveFLR`; the error is that of the picture's brightness.
+    lobes: give the light passes too. The rest is of `AdaptiveFLR`; the error is that of the
+    picture's brightness.
     """
 
     name: ClassVar[str] = "picture"
@@ -139,8 +153,8 @@ class WholePicture(AdaptiveFLR):
         *("normal", "seen_albedo", "seen_normal", "depth", "position"),
     )
 
+    slack: jax.Array | float = 0.005
     block: int = field(default=BLOCK, metadata={"static": True})
-    filtered: bool | None = field(default=None, metadata={"static": True})
     lobes: bool = field(default=False, metadata={"static": True})
 
     @property
@@ -155,32 +169,29 @@ class WholePicture(AdaptiveFLR):
         same_size(frame, self.name)
         if self.lobes and frame.lobes is None:
             raise ValueError("lobes are made of light passes with their colours: there are none")
-        if frame.single:
-            # One sample does not show that it is not at the pixel's centre.
-            block = BLOCK_OF_ONE if self.block == BLOCK else self.block
-            return dataclasses.replace(self, block=block, filtered=True)
         return self
 
     def images(
         self, frame: Frame, names: tuple[str, ...], scene: Scene | None = None, smooth: Any = None
     ) -> Parts:
         """The light of the surfaces, the guides, and what makes it a picture again."""
-        return _images(self.filtered, frame, scene_of(frame) if scene is None else scene)
+        return _images(frame, scene_of(frame) if scene is None else scene)
 
     def stages(self) -> tuple[Stage, ...]:
         fit = super().stages()
         given = tuple(name for name, _ in fit[-1].gives)
         gives = tuple((name, 0) for name in (*given, *(["passes"] if self.lobes else [])))
         # The shares of the passes are fitted to the whole frame.
-        reach = EVERYTHING if self.lobes else 0
-        return (*fit, Stage(compose, gives, given, pixels=True, reach=reach, composes=True))
+        reach = EVERYTHING if self.lobes else REACH
+        last = Stage(compose, gives, given, True, reach, align=DETAIL_BLOCK, composes=True)
+        return *fit, last
 
 
 def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
     """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`; its error; and its light passes, as
     in `Frame.lobes`, their colours, and what is emitted and seen of the environment, as planes of
     `(H, W, C)`."""
-    image, alpha = composed(parts["image"], parts), parts["alpha"]
+    image, alpha = composed(parts), parts["alpha"]
     given = {"image": image if alpha is None else jnp.concatenate([image, alpha], axis=-1)}
     if method.lobes:
         emitted, environment = parts["emitted"], parts["environment"]
@@ -194,12 +205,12 @@ def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
     return given
 
 
-@functools.partial(jit, static_argnames="filtered")
-def _images(filtered: bool | None, frame: Frame, scene: Scene) -> Parts:
+@jit
+def _images(frame: Frame, scene: Scene) -> Parts:
     picture = picture_in(frame, scene)
     assert scene.averaged is not None and scene.light is not None and scene.lit is not None
-    averaged = scene.averaged if filtered is None else filtered
-    images = images_of(picture, cleaned(picture, averaged, scene.light), scene.lit)
+    clean = cleaned(picture, scene.light, frame.samples, scene.averaged)
+    images = images_of(picture, clean, scene.light, scene.lit)
     return images | {"lobes": frame.lobes}
 
 
@@ -242,13 +253,13 @@ def light_in(picture: Picture, *parts: jax.Array | None) -> jax.Array:
     return sum((part for part in parts if part is not None), jnp.zeros_like(picture.beauty))
 
 
-def filter_picture(picture: Picture, unit: jax.Array) -> Picture:
+def filter_picture(picture: Picture, unit: jax.Array, samples: jax.Array | float) -> Picture:
     """Every layer but the beauty without its noise. unit: brightness of the picture, `()`."""
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
     del layers["beauty"]
     unit = jnp.maximum(unit, 1e-12)
     steering = [steer(name, layer, unit) for name, layer in layers.items() if name in STEERING]
-    filtered = filter_features(steering, list(layers.values()))
+    filtered = filter_features(steering, list(layers.values()), samples)
     return picture._replace(**dict(zip(layers, filtered, strict=True)))
 
 

@@ -68,7 +68,7 @@ def test_the_layers_of_a_file_make_up_its_beauty(name: str) -> None:
     own = frame.emitted + (frame.environment if frame.alpha is None else 0)
     total = radiance(frame.lobes, frame.lobe_colours) + own
     np.testing.assert_allclose(total, frame.beauty, atol=2e-3 * frame.beauty.max())
-    assert frame.lobes.shape == (36, 64, 18) and not frame.single
+    assert frame.lobes.shape == (36, 64, 18) and frame.samples == 4
     assert np.all(frame.seen_albedo >= 0) and frame.seen_normal.shape == (36, 64, 3)
 
 
@@ -112,14 +112,18 @@ def test_our_own_frames_are_not(frame: Frame, frame_file: Path) -> None:
         jflnr.denoise(frame, "picture")
 
 
-def test_one_sample_per_pixel_takes_larger_blocks(tmp_path: Path) -> None:
+def test_the_filter_follows_the_samples_that_a_file_tells(tmp_path: Path) -> None:
     source, name = FOLDER / "cutout.exr", "cycles.ViewLayer.samples"
     others = exr.read_attributes(source).others
-    assert others[name] == "4"
-    exr.write_channels(tmp_path / "a.exr", exr.read_channels(source), others=others | {name: "1"})
-    frame = read_frame(tmp_path / "a.exr")
-    method = WholePicture().for_frame(frame, ())
-    assert frame.single and method.filtered and method.block == 4
+    written: dict[str, Frame] = {}
+    for samples in ("1", "4", "many"):
+        path = tmp_path / f"{samples}.exr"
+        exr.write_channels(path, exr.read_channels(source), others=others | {name: samples})
+        written[samples] = read_frame(path)
+    assert [frame.samples for frame in written.values()] == [1, 4, None]
+    few, four, unknown = (WholePicture().images(frame, ())["surface"] for frame in written.values())
+    assert np.mean(np.abs(np.diff(few, axis=1))) < np.mean(np.abs(np.diff(four, axis=1)))
+    np.testing.assert_allclose(unknown, four, atol=1e-6)
 
 
 @pytest.mark.filterwarnings("error")

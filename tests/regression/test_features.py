@@ -24,6 +24,12 @@ def test_an_edge_of_few_samples_comes_nearer_to_its_coverage(rng):
     assert np.mean((result - exact) ** 2) < 0.5 * np.mean((noisy - exact) ** 2)
 
 
+def test_more_samples_are_averaged_less(rng):
+    noisy = edge(rng, 4)
+    few, many = (filtered((noisy,), (noisy,), samples)[0] for samples in (1.0, 64.0))
+    assert np.mean((many - noisy) ** 2) < 0.5 * np.mean((few - noisy) ** 2)
+
+
 def blurred(image):
     for axis in (0, 1):
         padded = np.pad(image, [(1, 1) if a == axis else (0, 0) for a in range(image.ndim)], "edge")
@@ -46,18 +52,19 @@ def test_the_average_is_that_of_its_formula(rng):
     products = [np.sum(a * b, axis=-1) for a, b in ((down, down), (down, right), (right, right))]
     across = blurred(blurred(blurred(np.stack(products, axis=-1))))
     expected, reach = np.zeros_like(follow), features.REACH
+    alike = features.VARIANCE / 9 + features.LEAST
     for y, x in np.ndindex(9, 11):
         total = 0.0
         for v in range(max(y - reach, 0), min(y + reach + 1, 9)):
             for u in range(max(x - reach, 0), min(x + reach + 1, 11)):
                 step = np.array([(v - y) ** 2, 2 * (v - y) * (u - x), (u - x) ** 2])
-                apart = across[y, x] @ step / features.ALIKE**2
+                apart = across[y, x] @ step / alike
                 apart += (step[0] + step[2]) / features.WIDTH**2
-                apart += np.sum((near[v, u] - near[y, x]) ** 2) / features.NEAR**2
+                apart += np.sum((near[v, u] - near[y, x]) ** 2) / (features.NEAR**2 * alike)
                 total += np.exp(-apart / 2)
                 expected[y, x] += np.exp(-apart / 2) * follow[v, u]
         expected[y, x] /= total
-    (result,) = filtered((np.float32(steer),), (np.float32(follow),))
+    (result,) = filtered((np.float32(steer),), (np.float32(follow),), 9.0)
     np.testing.assert_allclose(result, expected, rtol=2e-5)
 
 
