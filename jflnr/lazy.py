@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,6 +27,7 @@ else:
     jax, jnp, lax = _Lazy("jax"), _Lazy("jax.numpy"), _Lazy("jax.lax")
 
 T = TypeVar("T", bound=type)
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def pytree(dataclass: T) -> T:
@@ -33,6 +36,39 @@ def pytree(dataclass: T) -> T:
         lambda module: module.tree_util.register_dataclass(dataclass), "jax"
     )
     return dataclass
+
+
+@functools.cache
+def _first_user(what: str) -> int:
+    """The process that used it first; a forked one inherits the answer."""
+    return os.getpid()
+
+
+def check_not_forked(what: str, error: type[Exception]) -> None:
+    """Raise the error where a process was forked that had used what has threads of its own."""
+    if _first_user(what) != os.getpid():
+        raise error(
+            f"{what} was used before this process was forked, and its threads do not live on here; "
+            "start processes with multiprocessing's method 'spawn' or 'forkserver'"
+        )
+
+
+def concrete(function: F) -> F:
+    """The function, which says in one sentence that it takes nothing that JAX traces."""
+
+    @functools.wraps(function)
+    def run(*given: Any, **named: Any) -> Any:
+        try:
+            return function(*given, **named)
+        except TypeError as error:
+            if "jax" not in sys.modules or not isinstance(error, jax.errors.JAXTypeError):
+                raise
+        raise TypeError(
+            "jax.jit, jax.vmap and jax.grad go through methods on the jax backend only, without "
+            "tile, and not through auto"
+        ) from None
+
+    return run  # type: ignore[return-value]
 
 
 def jit(function: Callable[..., Any], **options: Any) -> Any:

@@ -48,3 +48,24 @@ def test_strict_settings(frame: Frame, method: str, backend: str, strict: str) -
         found = [ways[1](frame), ways[1].next(frame), ways[1].next(frame)]
     for image, right in zip(found, wanted, strict=True):
         np.testing.assert_array_equal(image, right, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [("flr", {"backend": "opencl"}), ("flr", {"tile": 32}), ("auto", {})],
+)
+def test_what_jax_cannot_trace_is_one_sentence(frame: Frame, method: str, options: dict) -> None:
+    if options.get("backend") == "opencl":
+        pytest.importorskip("pyopencl")
+    denoise = jflnr.Denoiser(method, **options)
+    light = lambda light: denoise(dataclasses.replace(frame, indirect=light)).sum()
+    one = jax.numpy.asarray(frame.indirect)
+    calls = [lambda: jax.jit(light)(one), lambda: jax.grad(light)(one)]
+    for call in (*calls, lambda: jax.vmap(light)(one[None])):
+        with pytest.raises(TypeError, match=r"^jax\.jit, jax\.vmap and jax\.grad go through"):
+            call()
+
+
+@pytest.mark.parametrize("method", ["flr", "flr-adaptive", "flnr", "picture", "bmfr"])
+def test_a_block_far_beyond_the_frame_is_clamped(frame: Frame, method: str) -> None:
+    assert jflnr.Denoiser(method, block=10**9).method_for(frame).block == 64

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jflnr.lazy import concrete
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import (
     check_counts,
@@ -47,6 +48,7 @@ class Step(NamedTuple):
 BRIGHT = 1e15
 
 
+@concrete
 def flr_adaptive(
     target: Any,
     guides: Any,
