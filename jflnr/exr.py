@@ -306,7 +306,8 @@ def _check_file(path: Path) -> None:
 
 def _why_unreadable(path: Path) -> str:
     """OpenEXR only says that it could not open the file. The usual reasons can be told apart."""
-    _, found, after = path.read_bytes()[: 1 << 16].partition(DATA_WINDOW)
+    with path.open("rb") as file:
+        _, found, after = file.read(1 << 16).partition(DATA_WINDOW)
     if found and len(after) >= 16:
         x0, y0, x1, y1 = struct.unpack("<4i", after[:16])
         if x1 < x0 or y1 < y0:

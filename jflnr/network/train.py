@@ -105,7 +105,11 @@ def train(
     step, losses, update = int(state.step), list[float](), _update()
     stopped, began = False, 0.0
     spent = lambda: time.monotonic() - began
-    save = lambda: state_file and save_state(state_file, (state, best), history, run)
+
+    def save() -> None:
+        if state_file is not None:
+            save_state(state_file, (state, best), history, run)
+
     try:
         with Batches(records, settings) as batches:
             if max(history[-1].seconds / seconds, step / steps) < 1:
