@@ -15,7 +15,7 @@ import numpy as np
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.lazy import check_not_forked, concrete, jax, jit
+from jflnr.lazy import check_not_forked, jax, jit
 from jflnr.methods import BACKENDS, DEFAULT, default_of, method_of
 from jflnr.regression.arguments import block_for
 from jflnr.stages import Parts, regress
@@ -30,7 +30,7 @@ def _own_settings(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function in float32, with the promotions it was written for, whatever JAX is told."""
 
     @functools.wraps(function)
-    @concrete
+    @checks.one_sentence
     def wrapped(self: Denoiser, *given: Any, **named: Any) -> Any:
         if "jax" not in sys.modules and self.backend == "opencl":
             return function(self, *given, **named)
@@ -207,13 +207,25 @@ class Denoiser:
         `denoise`. folder: for temporary files; the system's own if None.
         Yields the first row of each strip, and by name `image`, `(h, W, C)`, and more.
         """
+        parts = self._strips(rows, names, tile, folder)
+        while (found := self._next_of(parts)) is not None:
+            yield found
+
+    @_own_settings
+    def _next_of(self, parts: Iterator[tuple[int, Parts]]) -> tuple[int, Parts] | None:
+        return next(parts, None)
+
+    def _strips(
+        self, rows: Rows, names: tuple[str, ...], tile: int, folder: Path | None
+    ) -> Iterator[tuple[int, Parts]]:
         from jflnr.large import tiled
 
         shapes = rows.shapes()
         method = self.method_for(shapes).for_frame(shapes, names)
         if self.backend == "jax":
-            return tiled.strips(rows, method, names, tile, folder)
-        return tiled.overlapping(rows, method, names, tile, self._on_device(method))
+            yield from tiled.strips(rows, method, names, tile, folder)
+        else:
+            yield from tiled.overlapping(rows, method, names, tile, self._on_device(method))
 
     def _tiled(self, frame: Frame, names: tuple[str, ...], tile: int) -> Parts:
         from jflnr.large.source import rows_of

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import importlib
 import os
-import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -27,7 +26,6 @@ else:
     jax, jnp, lax = _Lazy("jax"), _Lazy("jax.numpy"), _Lazy("jax.lax")
 
 T = TypeVar("T", bound=type)
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 def pytree(dataclass: T) -> T:
@@ -51,24 +49,6 @@ def check_not_forked(what: str, error: type[Exception]) -> None:
             f"{what} was used before this process was forked, and its threads do not live on here; "
             "start processes with multiprocessing's method 'spawn' or 'forkserver'"
         )
-
-
-def concrete(function: F) -> F:
-    """The function, which says in one sentence that it takes nothing that JAX traces."""
-
-    @functools.wraps(function)
-    def run(*given: Any, **named: Any) -> Any:
-        try:
-            return function(*given, **named)
-        except TypeError as error:
-            if "jax" not in sys.modules or not isinstance(error, jax.errors.JAXTypeError):
-                raise
-        raise TypeError(
-            "jax.jit, jax.vmap and jax.grad go through methods on the jax backend only, without "
-            "tile, and not through auto"
-        ) from None
-
-    return run  # type: ignore[return-value]
 
 
 def jit(function: Callable[..., Any], **options: Any) -> Any:

@@ -65,5 +65,7 @@ def _check_use(about: dict[str, Any]) -> None:
 
     guides = about.get("guides", [])
     if not isinstance(guides, list) or not all(guide in NAMES for guide in guides):
-        raise ValueError(f"guides must be a list of names out of {', '.join(NAMES)}; got {guides!r:.80}")
+        raise ValueError(
+            f"guides must be a list of names out of {', '.join(NAMES)}; got {guides!r:.80}"
+        )
     checks.positive_integer("block", about.get("block", 1))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jflnr.lazy import concrete
+from jflnr.checks import one_sentence
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import (
     check_counts,
@@ -48,7 +48,7 @@ class Step(NamedTuple):
 BRIGHT = 1e15
 
 
-@concrete
+@one_sentence
 def flr_adaptive(
     target: Any,
     guides: Any,

@@ -8,8 +8,8 @@ import numpy as np
 
 from jflnr.bmfr import pipeline
 from jflnr.bmfr.pipeline import BMFR, DARK, PAPER, History
+from jflnr.checks import one_sentence
 from jflnr.frame import Frame
-from jflnr.lazy import concrete
 from jflnr.opencl.arguments import to_output
 from jflnr.opencl.bmfr_fit import fit
 from jflnr.opencl.context import Context, default_context, is_device_array
@@ -25,7 +25,7 @@ def start(frame: Frame, context: Context | None = None) -> History:
     return History(0, surface, zeros(1), zeros(3), zeros(3), zeros(3))
 
 
-@concrete
+@one_sentence
 def step(
     history: History,
     frame: Frame,

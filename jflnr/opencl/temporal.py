@@ -9,8 +9,8 @@ from typing import Any
 import jax
 import numpy as np
 
+from jflnr.checks import one_sentence
 from jflnr.frame import Frame
-from jflnr.lazy import concrete
 from jflnr.opencl import twins
 from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.bmfr import to_device
@@ -36,7 +36,7 @@ def start(frame: Frame, context: Context | None = None) -> State:
     return State(surface, light, image, no_evidence(context, height, width))
 
 
-@concrete
+@one_sentence
 def step(
     state: State,
     frame: Frame,
