@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 # How long the main thread may take to stop by itself, in seconds.
 PATIENCE = 1.0
@@ -62,6 +62,7 @@ def _watch() -> None:
     for number in ENDING:
         if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):
             signal.signal(number, _interrupt)  # otherwise it is not to be interrupted
+    sys.unraisablehook = _swallowed
     if sys.platform != "win32":  # where only a socket can be told
         listening, told = os.pipe()
         os.set_blocking(told, False)
@@ -76,6 +77,13 @@ def _interrupt(_: int, frame: FrameType | None) -> None:
             _leave()
         frame = frame.f_back
     raise KeyboardInterrupt
+
+
+def _swallowed(unraisable: Any) -> None:
+    """Let Ctrl-C end the process also where Python drops exceptions, as in garbage collection."""
+    if unraisable.exc_type is KeyboardInterrupt:
+        _leave()
+    sys.__unraisablehook__(unraisable)
 
 
 def _end(listening: int) -> None:

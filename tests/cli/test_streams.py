@@ -120,15 +120,28 @@ def stuck():
 jflnr.cli.main = stuck
 raise SystemExit(jflnr.__main__.main())
 """
+COLLECTING = STUCK.replace(
+    "def stuck():",
+    """class Collected:
+    def __del__(self):
+        print("ready", flush=True)
+        time.sleep(60)
+def stuck():
+    with replacing("out.exr"):
+        Collected()
+        time.sleep(60)
+def never():""",
+)
 IMPORTING = "print('ready', flush=True)\nimport time\ntime.sleep(60)"
 
 
-@pytest.mark.parametrize("where", ["stuck", "importing"])
-def test_an_interruption_ends_it(tmp_path: Path, where: str) -> None:
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("where", ["stuck", "collecting", "importing"])
+def test_an_interruption_ends_it(tmp_path: Path, where: str, kind: int) -> None:
     (tmp_path / "modules" / "numpy").mkdir(parents=True)
     (tmp_path / "folder").mkdir()
     path = [str(Path(__file__).parents[2])]
-    command = [sys.executable, "-c", STUCK]
+    command = [sys.executable, "-c", COLLECTING if where == "collecting" else STUCK]
     if where == "importing":
         (tmp_path / "modules" / "numpy" / "__init__.py").write_text(IMPORTING)
         path.insert(0, str(tmp_path / "modules"))
@@ -142,7 +155,7 @@ def test_an_interruption_ends_it(tmp_path: Path, where: str) -> None:
     )
     assert process.stdout is not None
     assert process.stdout.readline() == b"ready\n"
-    process.send_signal(signal.SIGINT)
+    process.send_signal(kind)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
     assert said == b"jflnr: interrupted; no partial file is left\n"
