@@ -17,7 +17,7 @@ QUESTION = "Do calls from several threads give what the same calls give one afte
 MINUTES = 10
 
 METHODS = ("flr", "flr-adaptive", "bmfr")
-THREADS, CALLS, FRAMES = 8, 10_000, 12
+THREADS, CALLS, FRAMES = 8, 10_000, 6
 # How often threads take turns: as often as Python lets them.
 INTERVAL = 1e-6
 
