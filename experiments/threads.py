@@ -6,33 +6,33 @@ import itertools
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import jflnr
-from experiments import plots, results
+from experiments.results import Parts
 
 NAME = "threads"
 QUESTION = "Do calls from several threads give what the same calls give one after another?"
 MINUTES = 10
 
 METHODS = ("flr", "flr-adaptive", "bmfr")
-THREADS, CALLS, FRAMES = 8, 10_000, 12
+THREADS, CALLS, FRAMES = 8, 10_000, 6
 # How often threads take turns: as often as Python lets them.
 INTERVAL = 1e-6
 
 
-def run(quick: bool) -> dict[str, Any]:
+def run(quick: bool) -> Parts:
     """How many results differ, by method and back end, of `CALLS` in all."""
     cases = list(itertools.product(METHODS, jflnr.BACKENDS))
     calls = 10 if quick else -(-CALLS // len(cases))
     rows = []
     for method, backend in cases:
         wrong = differing(made_up(FRAMES), method, backend, calls)
-        rows.append({"method": method, "backend": backend, "calls": calls, "wrong": wrong})
-    return {"cases": rows, "threads": THREADS}
+        row = {"method": method, "backend": backend, "threads": THREADS, "calls": calls}
+        rows.append(row | {"wrong": wrong})
+        print(f"  {method}, {backend}: {wrong} of {calls} differ", flush=True)
+    return {"calls": rows}
 
 
 def made_up(count: int, brightness: float = 1) -> list[jflnr.Frame]:
@@ -67,9 +67,3 @@ def differing(frames: list[jflnr.Frame], method: str, backend: str, calls: int) 
             return sum(pool.map(wrong, range(calls)))
     finally:
         sys.setswitchinterval(before)
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """threads.md: wrong results by method and back end."""
-    columns = {"method": "method", "backend": "back end", "calls": "calls", "wrong": "wrong"}
-    plots.write_text(folder / f"{NAME}.md", results.table(result["cases"], columns))

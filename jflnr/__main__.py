@@ -6,11 +6,13 @@ import sys
 import threading
 import time
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 # How long the main thread may take to stop by itself, in seconds.
 PATIENCE = 1.0
 INTERRUPTED = 130
+# Of Ctrl-C, and of who runs programs for others.
+ENDING = (signal.SIGINT, signal.SIGTERM)
 # Bytes of compiled programs that are kept; the oldest go first.
 PROGRAMS = 1 << 28
 
@@ -57,9 +59,10 @@ def _keep_programs() -> None:
 
 def _watch() -> None:
     """Tell a thread of signals: a compiler keeps the main one from them, and may swallow them."""
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        return  # it is not to be interrupted
-    signal.signal(signal.SIGINT, _interrupt)
+    for number in ENDING:
+        if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):
+            signal.signal(number, _interrupt)  # otherwise it is not to be interrupted
+    sys.unraisablehook = _swallowed
     if sys.platform != "win32":  # where only a socket can be told
         listening, told = os.pipe()
         os.set_blocking(told, False)
@@ -76,9 +79,16 @@ def _interrupt(_: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def _swallowed(unraisable: Any) -> None:
+    """Let Ctrl-C end the process also where Python drops exceptions, as in garbage collection."""
+    if unraisable.exc_type is KeyboardInterrupt:
+        _leave()
+    sys.__unraisablehook__(unraisable)
+
+
 def _end(listening: int) -> None:
-    """Once there was a Ctrl-C, end the process if it does not end by itself."""
-    while os.read(listening, 1)[0] != signal.SIGINT:
+    """Once there was such a signal, end the process if it does not end by itself."""
+    while os.read(listening, 1)[0] not in ENDING:
         pass
     time.sleep(PATIENCE)
     _leave()

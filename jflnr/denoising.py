@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib
 import sys
@@ -14,8 +15,9 @@ import numpy as np
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.lazy import jax, jit
+from jflnr.lazy import check_not_forked, jax, jit
 from jflnr.methods import BACKENDS, DEFAULT, default_of, method_of
+from jflnr.regression.arguments import block_for
 from jflnr.stages import Parts, regress
 
 if TYPE_CHECKING:
@@ -28,9 +30,12 @@ def _own_settings(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function in float32, with the promotions it was written for, whatever JAX is told."""
 
     @functools.wraps(function)
+    @checks.one_sentence
     def wrapped(self: Denoiser, *given: Any, **named: Any) -> Any:
         if "jax" not in sys.modules and self.backend == "opencl":
             return function(self, *given, **named)
+        if self.backend == "jax":
+            check_not_forked("JAX", RuntimeError)
         rank, kind = jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard")
         with jax.enable_x64(False), rank, kind:
             return function(self, *given, **named)
@@ -135,10 +140,14 @@ class Denoiser:
 
     def method_for(self, frame: Frame) -> Any:
         """The method that denoises a frame."""
-        if self.method is not None:
-            return self.method
-        name = default_of(frame) if self.guides is None else DEFAULT
-        return self._checked(method_of(name, **self.options))
+        method = self.method
+        if method is None:
+            name = default_of(frame) if self.guides is None else DEFAULT
+            method = self._checked(method_of(name, **self.options))
+        if not hasattr(method, "block"):
+            return method
+        block = block_for(method.block, max(np.shape(frame.normal)[:2], default=1))
+        return method if block == method.block else dataclasses.replace(method, block=block)
 
     @_own_settings
     def __call__(self, frame: Frame, out: np.ndarray | None = None) -> Any:
@@ -198,13 +207,25 @@ class Denoiser:
         `denoise`. folder: for temporary files; the system's own if None.
         Yields the first row of each strip, and by name `image`, `(h, W, C)`, and more.
         """
+        parts = self._strips(rows, names, tile, folder)
+        while (found := self._next_of(parts)) is not None:
+            yield found
+
+    @_own_settings
+    def _next_of(self, parts: Iterator[tuple[int, Parts]]) -> tuple[int, Parts] | None:
+        return next(parts, None)
+
+    def _strips(
+        self, rows: Rows, names: tuple[str, ...], tile: int, folder: Path | None
+    ) -> Iterator[tuple[int, Parts]]:
         from jflnr.large import tiled
 
         shapes = rows.shapes()
         method = self.method_for(shapes).for_frame(shapes, names)
         if self.backend == "jax":
-            return tiled.strips(rows, method, names, tile, folder)
-        return tiled.overlapping(rows, method, names, tile, self._on_device(method))
+            yield from tiled.strips(rows, method, names, tile, folder)
+        else:
+            yield from tiled.overlapping(rows, method, names, tile, self._on_device(method))
 
     def _tiled(self, frame: Frame, names: tuple[str, ...], tile: int) -> Parts:
         from jflnr.large.source import rows_of

@@ -7,6 +7,7 @@ Whatever is wrong with a file is raised as OSError or ValueError, in one sentenc
 
 import contextlib
 import errno
+import functools
 import io
 import os
 import struct
@@ -35,6 +36,8 @@ STRUCTURE = (
 # A small damaged header can announce any size. No real frame packs better than this.
 ALWAYS_ALLOWED_BYTES = 1 << 30
 PACKED_AT_MOST = 1000
+# Pixels; OpenEXR takes memory for a tile also where the image is smaller.
+LARGEST_TILE = 1 << 22
 # Texts of a header that are not UTF-8.
 MOST_TEXTS = 100
 
@@ -73,8 +76,8 @@ def layers_of(channels: Iterable[str]) -> dict[str, list[str]]:
 
 def read_attributes(path: PathLike) -> Attributes:
     """Comments, compression and windows of the file's first part, without its pixels."""
-    parts = _read_parts(Path(path), header_only=True)
-    header = parts[0].header
+    with _opened(Path(path)) as (parts, _):
+        header = parts[0].header
     (x0, y0), (x1, y1) = header["dataWindow"]
     low, high = header["displayWindow"]
     comments = header.get("comments")
@@ -95,12 +98,12 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
     Raises OSError when there is no such file, ValueError when it cannot be used.
     """
     path = Path(path)
-    announced = _read_parts(path, header_only=True)
-    for part in announced:
-        _check_header(path, part)
-    parts = _read_parts(path, header_only=False)
-    if len(parts) != len(announced):
-        raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
+    with _opened(path) as (announced, read):
+        for part in announced:
+            _check_header(path, part)
+        parts = read()
+        if len(parts) != len(announced):
+            raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
     channels = _named(parts)
     check_sizes(path, channels)
     if len({tuple(map(int, part.header["dataWindow"][0])) for part in parts}) > 1:
@@ -237,53 +240,63 @@ def _named(parts: list[_Part]) -> dict[str, np.ndarray]:
     return channels
 
 
-def _read_parts(path: Path, header_only: bool) -> list[_Part]:
-    """The parts that OpenEXR could read. It leaves out those whose pixels are damaged."""
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[tuple[list[_Part], Callable[[], list[_Part]]]]:
+    """The headers of all parts, and a function for the parts that OpenEXR can read with pixels.
+
+    It takes no texts or names that are not UTF-8. In the copy that it then gets, letters beyond
+    ASCII are tildes, which sort where they do; the texts are put back, taken as Latin-1.
+    """
     _check_file(path)
-    with _silence():
+    texts: dict[str, str] = {}
+    data, place, parts = b"", path, None
+    with _silence(), tempfile.TemporaryDirectory() as folder:
+
+        def read(header_only: bool) -> list[_Part]:
+            return _parts(place, header_only, lambda text: texts.get(text, text))
+
         try:
-            file, texts = _open(path, separate_channels=True, header_only=header_only)
-            return [
-                _Part(
-                    part.name(),
-                    {n: texts.get(v, v) if isinstance(v, str) else v for n, v in header.items()},
-                    {
-                        c.name: c.pixels
-                        for c in (header["channels"] if header_only else part.channels.values())
-                    },
-                )
-                for part, header in zip(
-                    file.parts, map(file.header, range(len(file.parts))), strict=True
-                )
-            ]
-        except Exception as error:  # RuntimeError, UnicodeDecodeError, TypeError, MemoryError, ...
+            while parts is None:
+                try:
+                    parts = read(header_only=True)
+                except UnicodeDecodeError as error:
+                    data, text = data or path.read_bytes(), error.object
+                    plain = bytes(byte if byte < 128 else ord("~") for byte in text)
+                    texts[plain.decode()] = text.decode("latin-1")
+                    length = struct.pack("<i", len(text))
+                    before, data = data, data.replace(length + text, length + plain)
+                    if data == before:  # a name, which ends with 0; the header comes first
+                        data = data.replace(text + b"\0", plain + b"\0", 1)
+                    if data == before or len(texts) > MOST_TEXTS:
+                        raise
+                    place = Path(folder) / "copy.exr"
+                    place.write_bytes(data)
+            yield parts, functools.partial(read, header_only=False)
+        except Exception as error:  # RuntimeError, TypeError, MemoryError, ...
+            if str(error).startswith(str(path)):
+                raise  # a sentence of ours
             raise ValueError(_why_unreadable(path)) from error
 
 
-def _open(path: Path, **options: bool) -> tuple[Any, dict[str, str]]:
-    """The file, and those texts of its header that are not UTF-8, taken as Latin-1.
+def _parts(path: Path, header_only: bool, named: Callable[[str], str]) -> list[_Part]:
+    """named: what a text or a name of the file stands for."""
+    file = OpenEXR.File(os.fsencode(path), separate_channels=True, header_only=header_only)
+    return [
+        _Part(
+            part.name(),
+            {named(n): named(v) if isinstance(v, str) else v for n, v in header.items()},
+            {
+                named(channel.name): channel.pixels
+                for channel in (header["channels"] if header_only else part.channels.values())
+            },
+        )
+        for part, header in zip(file.parts, map(file.header, range(len(file.parts))), strict=True)
+    ]
 
-    OpenEXR opens no such file. In the copy that it gets, letters beyond ASCII are question marks;
-    the texts are by what they are there.
-    """
-    texts: dict[str, str] = {}
-    try:
-        return OpenEXR.File(os.fsencode(path), **options), texts
-    except UnicodeDecodeError:
-        data = path.read_bytes()
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "copy.exr"
-        while True:
-            copy.write_bytes(data)
-            try:
-                return OpenEXR.File(os.fsencode(copy), **options), texts
-            except UnicodeDecodeError as error:
-                plain = bytes(byte if byte < 128 else ord("?") for byte in error.object)
-                texts[plain.decode()] = error.object.decode("latin-1")
-                length = struct.pack("<i", len(plain))
-                before, data = data, data.replace(length + error.object, length + plain)
-                if data == before or len(texts) > MOST_TEXTS:
-                    raise
+
+def latin_1(name: str) -> str:
+    """A name whose bytes are not UTF-8, and so surrogates, taken as Latin-1; others as they are."""
+    return name if name.isprintable() else name.encode(errors="surrogateescape").decode("latin-1")
 
 
 def _check_file(path: Path) -> None:
@@ -306,7 +319,8 @@ def _check_file(path: Path) -> None:
 
 def _why_unreadable(path: Path) -> str:
     """OpenEXR only says that it could not open the file. The usual reasons can be told apart."""
-    _, found, after = path.read_bytes()[: 1 << 16].partition(DATA_WINDOW)
+    with path.open("rb") as file:
+        _, found, after = file.read(1 << 16).partition(DATA_WINDOW)
     if found and len(after) >= 16:
         x0, y0, x1, y1 = struct.unpack("<4i", after[:16])
         if x1 < x0 or y1 < y0:
@@ -320,7 +334,11 @@ def _check_header(path: Path, part: _Part) -> None:
         raise ValueError(f"{path} holds deep pixels; flatten it first")
     (x0, y0), (x1, y1) = part.header["dataWindow"]
     width, height = int(x1) - int(x0) + 1, int(y1) - int(y0) + 1
-    channels = len(part.header["channels"])
+    channels, tiles = len(part.header["channels"]), part.header.get("tiles")
+    if tiles is not None and tiles.xSize * tiles.ySize > max(width * height, LARGEST_TILE):
+        raise ValueError(
+            f"{path} is damaged: its header announces tiles of {tiles.xSize} x {tiles.ySize} pixels"
+        )
     size = path.stat().st_size
     if 4 * width * height * channels > max(ALWAYS_ALLOWED_BYTES, PACKED_AT_MOST * size):
         raise ValueError(

@@ -24,6 +24,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
     Raises OSError that names `path` where the disk, or who guards it, says no.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():  # whoever may would replace /dev/null
+        raise OSError(f"{path} cannot be written: it is a folder, a pipe or a device")
     # What mkstemp adds, 10 letters with ours, may be too many for the file system.
     prefix = f".{path.stem[:-10]}-"
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -33,6 +34,21 @@ def pytree(dataclass: T) -> T:
         lambda module: module.tree_util.register_dataclass(dataclass), "jax"
     )
     return dataclass
+
+
+@functools.cache
+def _first_user(what: str) -> int:
+    """The process that used it first; a forked one inherits the answer."""
+    return os.getpid()
+
+
+def check_not_forked(what: str, error: type[Exception]) -> None:
+    """Raise the error where a process was forked that had used what has threads of its own."""
+    if _first_user(what) != os.getpid():
+        raise error(
+            f"{what} was used before this process was forked, and its threads do not live on here; "
+            "start processes with multiprocessing's method 'spawn' or 'forkserver'"
+        )
 
 
 def jit(function: Callable[..., Any], **options: Any) -> Any:

@@ -14,6 +14,7 @@ from jflnr.methods import method_of
 FORMAT = "jflnr-parameters"
 VERSION = 1
 METHODS = ("flr", "flr-adaptive")
+LARGEST = 1 << 20  # bytes of a file that are looked at
 
 
 def numbers_of(method: Any) -> dict[str, float]:
@@ -33,7 +34,10 @@ def load_parameters(path: str | Path) -> tuple[Any, dict[str, Any]]:
     """The method with its numbers, and the rest of the file; `ValueError` if it is no such file."""
     wanted = f"a JSON file that `jflnr fit` wrote (format {FORMAT!r}, version {VERSION})"
     try:
-        text = json.loads(Path(path).read_bytes())
+        if not Path(path).is_file() and Path(path).exists():
+            raise ValueError("it is a pipe, a device or a folder")  # whose reading may never end
+        with open(path, "rb") as file:
+            text = json.loads(file.read(LARGEST))
     except FileNotFoundError:
         raise ValueError(f"{path}: there is no such file; --params wants {wanted}") from None
     except (OSError, ValueError, RecursionError) as error:
@@ -42,7 +46,7 @@ def load_parameters(path: str | Path) -> tuple[Any, dict[str, Any]]:
         raise ValueError(f"{path}: not a parameter file; it should be {wanted}")
     name = text.get("method", "flr")
     if name not in METHODS:
-        raise ValueError(f"{path}: its method is {name!r}; it should be {' or '.join(METHODS)}")
+        raise ValueError(f"{path}: its method is {name!r:.80}; it should be {' or '.join(METHODS)}")
     names = list(numbers_of(method_of(name)))
     if not all(type(text.get(number)) in (int, float) for number in names):
         raise ValueError(
@@ -61,5 +65,7 @@ def _check_use(about: dict[str, Any]) -> None:
 
     guides = about.get("guides", [])
     if not isinstance(guides, list) or not all(guide in NAMES for guide in guides):
-        raise ValueError(f"guides must be a list of names out of {', '.join(NAMES)}; got {guides}")
+        raise ValueError(
+            f"guides must be a list of names out of {', '.join(NAMES)}; got {guides!r:.80}"
+        )
     checks.positive_integer("block", about.get("block", 1))

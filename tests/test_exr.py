@@ -178,7 +178,7 @@ def test_unwritable(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"a\.exr cannot be written: No such file or directory"):
         exr.write_channels(tmp_path / "gone" / "a.exr", {"R": pixels()})
     (tmp_path / "folder.exr").mkdir()
-    with pytest.raises(OSError, match=r"folder\.exr cannot be written: Is a directory"):
+    with pytest.raises(OSError, match=r"folder\.exr cannot be written: it is a folder"):
         exr.write_channels(tmp_path / "folder.exr", {"R": pixels()})
     assert [p.name for p in tmp_path.iterdir()] == ["folder.exr"]
 

@@ -9,6 +9,7 @@ import pytest
 
 import jflnr
 from jflnr.frame import Frame
+from jflnr.large.source import rows_of
 
 SETTINGS = {
     "wide": jax.enable_x64,
@@ -40,11 +41,61 @@ def test_strict_settings(frame: Frame, method: str, backend: str, strict: str) -
     if backend == "opencl":
         pytest.importorskip("pyopencl")
     frame = dataclasses.replace(frame, motion=np.zeros_like(frame.motion))
-    ways = [jflnr.Denoiser(method, backend=backend) for _ in range(2)]
-    wanted = [ways[0](frame), ways[0].next(frame), ways[0].next(frame)]
+
+    def results() -> list[np.ndarray]:
+        way = jflnr.Denoiser(method, backend=backend)
+        found = [way(frame), way.next(frame), way.next(frame)]
+        if method == "flr":  # as the command has it, from file to file
+            strips = way.strips(rows_of(frame), ("normal", "depth"), 16)
+            found += [parts["image"] for _, parts in strips]
+        return found
+
+    wanted = results()
     with contextlib.ExitStack() as stack:
         for name, setting in SETTINGS.items():
             stack.enter_context(setting(strict in (name, "all")))
-        found = [ways[1](frame), ways[1].next(frame), ways[1].next(frame)]
+        found = results()
     for image, right in zip(found, wanted, strict=True):
         np.testing.assert_array_equal(image, right, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [("flr", {"backend": "opencl"}), ("flr", {"tile": 32}), ("auto", {})],
+)
+def test_what_jax_cannot_trace_is_one_sentence(frame: Frame, method: str, options: dict) -> None:
+    if options.get("backend") == "opencl":
+        pytest.importorskip("pyopencl")
+    denoise = jflnr.Denoiser(method, **options)
+    light = lambda light: denoise(dataclasses.replace(frame, indirect=light)).sum()
+    one = jax.numpy.asarray(frame.indirect)
+    calls = [lambda: jax.jit(light)(one), lambda: jax.grad(light)(one)]
+    for call in (*calls, lambda: jax.vmap(light)(one[None])):
+        with pytest.raises(TypeError, match=r"^jax\.jit, jax\.vmap and jax\.grad go through"):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("backend", "place", "error", "kind"),
+    [
+        ("jax", "jflnr.denoising._whole", "jax.errors.JaxRuntimeError", MemoryError),
+        ("opencl", "jflnr.opencl.twins.regress", "pyopencl.Error", OSError),
+    ],
+)
+def test_a_device_without_room_is_one_sentence(
+    frame: Frame, backend: str, place: str, error: str, kind: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, name = error.rsplit(".", 1)
+    full = getattr(pytest.importorskip(home), name)
+
+    def fail(*_: object, **__: object) -> None:
+        raise full("RESOURCE_EXHAUSTED: Out of memory\n\nmuch more")
+
+    monkeypatch.setattr(place, fail)
+    with pytest.raises(kind, match=r"^the .*device .*memory$"):
+        jflnr.denoise(frame, "flr", backend=backend)
+
+
+@pytest.mark.parametrize("method", ["flr", "flr-adaptive", "flnr", "picture", "bmfr"])
+def test_a_block_far_beyond_the_frame_is_clamped(frame: Frame, method: str) -> None:
+    assert jflnr.Denoiser(method, block=10**9).method_for(frame).block == 64

@@ -16,6 +16,7 @@ from jflnr.auto import plan as plans
 from jflnr.auto.blocks import SETTINGS, Models, Unfinished, fit, refine
 from jflnr.auto.collected import Collected, collect_frame, hold
 from jflnr.auto.glance import is_simple
+from jflnr.checks import one_sentence
 from jflnr.frame import Array, Frame
 from jflnr.images import guides as guide_layers
 from jflnr.images.inputs import plain_images, prepare, robust_images, same_size
@@ -83,6 +84,7 @@ def _regress(method: Any, frame: Frame, names: tuple[str, ...]) -> jax.Array:
     return regress(method, method.images(frame, names))["image"]
 
 
+@one_sentence
 def select(
     frame: Frame,
     budget_ms: float | None = None,

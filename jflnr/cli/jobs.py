@@ -1,6 +1,7 @@
 """Which frames a command line means, and where their results go."""
 
 import math
+import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -81,6 +82,6 @@ def check_apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -
 def _identity(path: Path) -> tuple[int, int] | Path:
     """What two names of one file have in common."""
     if not path.exists():
-        return path.resolve()
+        return Path(os.path.realpath(path))  # which takes links that lead nowhere
     status = path.stat()
     return status.st_dev, status.st_ino

@@ -4,8 +4,9 @@ FRAMES need the layers that `jflnr denoise` needs, several noisy layers (indirec
 indirect_4, ...) and `reference`, or `target`, what to learn instead. Folders are searched for .exr
 files. OUT is a file of weights for `jflnr denoise --method flnr --params OUT`. Beside it OUT.state
 holds the run, which goes on from there when the command is given again, and OUT.png the curves,
-where matplotlib is installed. The frames under about twenty realisations of their noise are kept in
-the folder of --cache, 17 MB for 320 x 184 pixels.
+where matplotlib is installed. After Ctrl-C, OUT and OUT.state are written too. The frames under
+about twenty realisations of their noise are kept in the folder of --cache, 17 MB for 320 x 184
+pixels.
 """
 
 import argparse
@@ -14,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jflnr.cli.common import INTERRUPTED
 from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
@@ -78,6 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         rate=arguments.rate,
         every=arguments.every,
     )
+    print("compiling, which may take minutes", flush=True)
     result = train(
         records,
         kept,
@@ -89,7 +92,10 @@ def run(arguments: argparse.Namespace) -> int:
     )
     _write(output, result, settings, paths)
     print(f"best: step {result.best.step}{_decibels(result.best)} -> {output}")
-    return 0
+    if not result.stopped:
+        return 0
+    print("stopped; the same command goes on from here")
+    return INTERRUPTED
 
 
 def _shown(paths: Sequence[Path]) -> Iterable[Path]:
@@ -128,6 +134,8 @@ def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence
         validation_psnr={spp: round(v, 3) for spp, v in result.best.validation.items()},
     )
     try:
+        if result.stopped:  # there is no time for it
+            return
         from matplotlib.figure import Figure
     except ImportError:
         return

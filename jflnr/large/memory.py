@@ -65,7 +65,7 @@ def tile_for(height: int, width: int, memory: int, at_once: int, method: Any) ->
     if not hasattr(method, "stages"):
         raise ValueError(f"method {method.name} needs the whole frame in memory: raise --memory")
     kind = method.name if method.name in PIECE else "flnr"
-    overlap = 2 * max(stage.reach for stage in method.stages())
+    overlap = 2 * min(max(stage.reach for stage in method.stages()), max(height, width))
     fixed = BASE + REST[kind] * pixels
     side = max((memory - fixed) / PIECE[kind], 0) ** 0.5 - overlap
     if side < SMALLEST:

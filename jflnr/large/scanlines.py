@@ -52,7 +52,8 @@ class Scanlines:
                 f"{path} has several parts or tiles, so it can only be read whole: raise --memory, "
                 "or write it as one part in scan lines"
             )
-        self.height, self.width, self.channels = spec.height, spec.width, spec.channelnames
+        self.height, self.width = spec.height, spec.width
+        self.channels = tuple(map(exr.latin_1, spec.channelnames))
         nothing = dict.fromkeys(self.channels, np.zeros((1, 1)))
         self.layout = recognise(nothing, spp, names, path)
         if len(nothing) > len(self.channels):

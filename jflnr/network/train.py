@@ -62,11 +62,13 @@ class Progress(NamedTuple):
 
 
 class Result(NamedTuple):
-    """params: the best by validation. history: one entry per validation, the first untrained."""
+    """params: the best by validation; if none was better than the untrained, the last. history:
+    one entry per validation, the first untrained. stopped: whether Ctrl-C ended the run."""
 
     params: unet.Params
     best: Progress
     history: list[Progress]
+    stopped: bool
 
 
 def train(
@@ -80,6 +82,8 @@ def train(
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Result:
     """Train for so many seconds or steps, whichever end first; the steps' size follows.
+
+    Seconds count from the first step, which is compiled before. After Ctrl-C the state is written.
 
     records: of `examples.prepared`. validation: frames with a reference. With a `state_file` that
     exists, go on where it was written: with a limit of steps to the weights of a run that was never
@@ -99,26 +103,42 @@ def train(
         history = [Progress(*entry) for entry in saved]
     top = max(history, key=lambda entry: (np.nan_to_num(entry.score), entry.step))
     step, losses, update = int(state.step), list[float](), _update()
-    began = time.monotonic() - history[-1].seconds
-    with Batches(records, settings) as batches:
-        while (done := max((time.monotonic() - began) / seconds, step / steps)) < 1:
-            rate = rate_at(step, done, settings)
-            state, value = update(state, batches(step), rate)
-            losses.append(float(value))
-            step += 1
-            over = time.monotonic() - began >= seconds or step >= steps
-            if step % settings.every == 0 or over:
-                spent = time.monotonic() - began
-                entry = Progress(step, spent, float(np.mean(losses)), score(state.average))
-                # Without validation frames nothing compares, and the last is the best.
-                if not entry.score < top.score:
-                    best, top = state.average, entry
-                history.append(entry)
-                losses.clear()
-                if state_file is not None:
-                    save_state(state_file, (state, best), history, run)
-                report(entry)
-    return Result(jax.tree.map(np.asarray, best), top, history)
+    stopped, began = False, 0.0
+    spent = lambda: time.monotonic() - began
+
+    def save() -> None:
+        if state_file is not None:
+            save_state(state_file, (state, best), history, run)
+
+    try:
+        with Batches(records, settings) as batches:
+            if max(history[-1].seconds / seconds, step / steps) < 1:
+                update(state, batches(step), np.float32(0))  # compiled, and nothing else
+            began = time.monotonic() - history[-1].seconds
+            while (done := max(spent() / seconds, step / steps)) < 1:
+                state, value = update(state, batches(step), rate_at(step, done, settings))
+                losses.append(float(value))
+                step += 1
+                if step % settings.every == 0 or spent() >= seconds or step >= steps:
+                    loss = float(np.mean(losses))
+                    entry = Progress(step, spent(), loss, score(state.average))
+                    # Without validation frames nothing compares, and the last is the best.
+                    if not entry.score < top.score:
+                        best, top = state.average, entry
+                    history.append(entry)
+                    losses.clear()
+                    save()
+                    report(entry)
+    except KeyboardInterrupt:
+        if not losses and len(history) == 1:
+            raise
+        stopped = True
+        last = Progress(int(state.step), spent(), float(np.mean(losses or [np.nan])), {})
+        if top.step == 0 or np.isnan(top.score):
+            best, top = state.average, last
+        history.append(last)
+        save()
+    return Result(jax.tree.map(np.asarray, best), top, history, stopped)
 
 
 def rate_at(step: int, done: float, settings: Settings) -> np.float32:

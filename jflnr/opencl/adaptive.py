@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jflnr.checks import one_sentence
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import (
     check_counts,
@@ -47,6 +48,7 @@ class Step(NamedTuple):
 BRIGHT = 1e15
 
 
+@one_sentence
 def flr_adaptive(
     target: Any,
     guides: Any,

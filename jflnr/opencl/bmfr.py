@@ -8,6 +8,7 @@ import numpy as np
 
 from jflnr.bmfr import pipeline
 from jflnr.bmfr.pipeline import BMFR, DARK, PAPER, History
+from jflnr.checks import one_sentence
 from jflnr.frame import Frame
 from jflnr.opencl.arguments import to_output
 from jflnr.opencl.bmfr_fit import fit
@@ -24,6 +25,7 @@ def start(frame: Frame, context: Context | None = None) -> History:
     return History(0, surface, zeros(1), zeros(3), zeros(3), zeros(3))
 
 
+@one_sentence
 def step(
     history: History,
     frame: Frame,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from types import ModuleType
 from typing import Any
+
+from jflnr.lazy import check_not_forked
 
 ADVICE = (
     "install an OpenCL driver, or PoCL, which runs on the processor: pip install 'jflnr[opencl]'"
@@ -26,18 +27,8 @@ def pyopencl() -> ModuleType:
         import pyopencl.tools
     except ImportError as error:
         raise NoDevice(f"The opencl backend needs pyopencl ({error}); {ADVICE}") from None
-    if _first_user() != os.getpid():
-        raise NoDevice(
-            "OpenCL was used before this process was forked, and its threads do not live on here; "
-            "start processes with multiprocessing's method 'spawn' or 'forkserver'"
-        )
+    check_not_forked("OpenCL", NoDevice)
     return pyopencl
-
-
-@functools.cache
-def _first_user() -> int:
-    """The process that used OpenCL first; a forked one inherits the answer."""
-    return os.getpid()
 
 
 def all_devices() -> list[Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from jflnr.checks import one_sentence
 from jflnr.network.flnr import DEFAULT, FLNR
 from jflnr.opencl import network
 from jflnr.opencl.adaptive import in_unit, write_light
@@ -14,6 +15,7 @@ from jflnr.opencl.energy import rescale
 from jflnr.regression.arguments import channel_count, check_regression
 
 
+@one_sentence
 def flnr(
     target: Any,
     guides: Any,

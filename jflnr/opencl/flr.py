@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from jflnr.checks import one_sentence
 from jflnr.opencl.apply import apply
 from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
 from jflnr.opencl.blur import blur
@@ -15,6 +16,7 @@ from jflnr.regression.arguments import channel_count, check_regression, layers_o
 from jflnr.regression.flr import DEFAULT, FLR
 
 
+@one_sentence
 def flr(
     target: Any,
     guides: Any,

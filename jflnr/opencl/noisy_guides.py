@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from jflnr.checks import one_sentence
 from jflnr.images.noisy_guides import DEPTH, NORMAL
 from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import guide_arguments, guide_defines
 
 
+@one_sentence
 def smooth_guide(guide: Any, normal: Any, depth: Any, context: Context | None = None) -> Any:
     """Average a guide over 3 x 3 pixels of the same surface: along rows, then along columns.
 

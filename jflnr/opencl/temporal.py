@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jflnr.checks import one_sentence
 from jflnr.frame import Frame
 from jflnr.opencl import twins
 from jflnr.opencl.arguments import to_layers
@@ -35,6 +36,7 @@ def start(frame: Frame, context: Context | None = None) -> State:
     return State(surface, light, image, no_evidence(context, height, width))
 
 
+@one_sentence
 def step(
     state: State,
     frame: Frame,

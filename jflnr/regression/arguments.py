@@ -28,6 +28,11 @@ def check_options(method: Any) -> None:
                 raise ValueError(f"{option.name} is {value}; it must be a positive number")
 
 
+def block_for(block: int, longest: int) -> int:
+    """The side of blocks in a frame whose longer side has so many pixels: not far beyond it."""
+    return min(block, 64 * max(-(-longest // 64), 1))
+
+
 def check_regression(
     target: Any,
     guides: Any,

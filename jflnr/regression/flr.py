@@ -11,16 +11,15 @@ from jflnr.frame import Frame
 from jflnr.images.inputs import factor_of, plain_images
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression.apply import apply
-from jflnr.regression.arguments import check_options, check_regression
+from jflnr.regression.arguments import block_for, check_options, check_regression
 from jflnr.regression.blur import blur
 from jflnr.regression.elimination import Solver
 from jflnr.regression.moments import Guides, centre, channels_of, collect
 from jflnr.regression.solve import solve
 from jflnr.stages import Known, Parts, Stage, regress
 
-# Pixels that the window reaches where its width is traced, and the steps that it comes in, so
-# that few programs are compiled.
-TRACED, STEP = 72, 24
+# Pixels that the reach of the window is a multiple of, so that few programs are compiled.
+STEP = 24
 
 
 @pytree
@@ -66,9 +65,16 @@ class FLR:
         return dataclasses.replace(self, block=block).at(factor, max(frame.normal.shape[:2]))
 
     def at(self, factor: int, longest: int) -> FLR:
-        """With the support for a frame whose longer side has so many pixels."""
-        support = self.support or support_of(self.sigma, longest)
-        return dataclasses.replace(self, support=support, factor=factor)
+        """For a frame whose longer side has so many pixels: a block no larger, and the support.
+
+        That of a width that is traced is not known yet.
+        """
+        whole, support = STEP * -(-longest // STEP), self.support
+        if support is None and _known(self.sigma):
+            support = support_of(self.sigma, longest)
+        support = None if support is None else min(support, whole)
+        block = block_for(self.block, -(-longest // factor))
+        return dataclasses.replace(self, block=block, support=support, factor=factor)
 
     def known(self, images: Parts) -> Known:
         """What guides are measured from."""
@@ -76,7 +82,9 @@ class FLR:
 
     def stages(self) -> tuple[Stage, ...]:
         side = self.side
-        reach = -(-(self.support or TRACED) // side) * side
+        # Where the width is traced, nobody cuts the frame.
+        known = self.support or (support_of(self.sigma) if _known(self.sigma) else 0)
+        reach = -(-known // side) * side
         return (
             Stage(collect_moments, (("moments", side),), pixels=True),
             Stage(fit_models, (("models", side),), ("moments",), reach=reach),
@@ -93,8 +101,8 @@ def collect_moments(method: FLR, parts: Parts, known: Known) -> Parts:
 def fit_models(method: FLR, parts: Parts, known: Known) -> Parts:
     """Kernels 2 and 3."""
     shift, moments = known["shift"], parts["moments"]
-    reach = -(-(method.support or TRACED) // method.side)
-    blurred = blur(moments, method.sigma / method.side, reach)
+    support = method.support or support_of(method.sigma, method.side * max(moments.shape[1:]))
+    blurred = blur(moments, method.sigma / method.side, -(-support // method.side))
     channels = channels_of(moments, shift.size)
     return {"models": solve(blurred, shift, method, channels, method.solver)}
 
@@ -141,13 +149,18 @@ def flr(
     return regress(method.at(factor, max(size)), images)["image"]
 
 
-def support_of(sigma: jax.Array | float, longest: int) -> int:
+def support_of(sigma: jax.Array | float, longest: float = math.inf) -> Any:
     """Three standard deviations, in steps of `STEP`, no farther than a frame's longer side.
 
-    A width that is traced, or differs from frame to frame, has no number yet.
+    An integer, or traced as sigma is.
     """
-    if not isinstance(sigma, int | float) and (
+    if _known(sigma):
+        return STEP * max(math.ceil(min(3 * float(sigma), longest) / STEP), 1)
+    return STEP * jnp.maximum(jnp.ceil(jnp.minimum(3 * sigma, longest) / STEP), 1)
+
+
+def _known(sigma: jax.Array | float) -> bool:
+    """Whether it is one number, neither traced nor another one for every frame."""
+    return isinstance(sigma, int | float) or not (
         isinstance(sigma, jax.core.Tracer) or jnp.ndim(sigma)
-    ):
-        return TRACED
-    return STEP * max(math.ceil(min(3 * float(sigma), longest) / STEP), 1)
+    )

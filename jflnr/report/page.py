@@ -42,7 +42,8 @@ def write_report(
         "lower": LOWER_IS_BETTER,
         "epsilon": RELATIVE_EPSILON,
     }
-    write_atomically(path, page(title, content, extra).encode())
+    text = page(title, content, extra)
+    write_atomically(path, text.encode(errors="replace"))  # names of files need not be UTF-8
 
 
 def page(title: str, content: Mapping[str, Any], extra: str) -> str:

@@ -61,6 +61,14 @@ def test_the_longest_names_can_be_written(tmp_path: Path, frame_file: Path) -> N
         assert (tmp_path / start).read_bytes() == b"x"
 
 
+def test_a_pipe_or_a_device_is_not_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("pipe", "."):
+        with pytest.raises(OSError, match="it is a folder, a pipe or a device"):
+            replacing(tmp_path / name).__enter__()
+    assert (tmp_path / "pipe").is_fifo()
+
+
 def test_a_full_disk_names_the_file(tmp_path: Path) -> None:
     with (
         pytest.raises(OSError, match=r"out\.npz cannot be written: No space left on device"),
@@ -73,13 +81,28 @@ def test_a_full_disk_names_the_file(tmp_path: Path) -> None:
         replacing(tmp_path / "gone" / "out.npz").__enter__()
 
 
+@pytest.mark.parametrize("name", ["pipe", "loop", "/dev/zero"])
 @pytest.mark.parametrize(
-    "line", ["info pipe", "denoise frame.exr -o o.exr --method flnr --params pipe"]
+    "line",
+    [
+        "info {}",
+        "denoise {} -o o.exr",
+        "denoise frame.exr -o o.exr --params {}",
+        "denoise frame.exr -o o.exr --method flnr --params {}",
+    ],
 )
-def test_a_pipe_is_no_file(frame_file: Path, line: str) -> None:
+def test_what_is_no_file(
+    frame_file: Path,
+    line: str,
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
     os.mkfifo(frame_file.with_name("pipe"))
-    done = shell(f"timeout 60 {JFLNR} {line}", frame_file.parent)
-    assert done.returncode == 2 and done.stderr.count(b"\n") == 1
+    frame_file.with_name("loop").symlink_to("loop")
+    monkeypatch.chdir(frame_file.parent)
+    assert main(line.format(name).split()) == 2
+    assert name in (said := capsys.readouterr().err) and said.count("\n") == 1
 
 
 # Where Python sees no signal, or whoever is called swallows it: as a compiler does.
@@ -97,15 +120,28 @@ def stuck():
 jflnr.cli.main = stuck
 raise SystemExit(jflnr.__main__.main())
 """
+COLLECTING = STUCK.replace(
+    "def stuck():",
+    """class Collected:
+    def __del__(self):
+        print("ready", flush=True)
+        time.sleep(60)
+def stuck():
+    with replacing("out.exr"):
+        Collected()
+        time.sleep(60)
+def never():""",
+)
 IMPORTING = "print('ready', flush=True)\nimport time\ntime.sleep(60)"
 
 
-@pytest.mark.parametrize("where", ["stuck", "importing"])
-def test_an_interruption_ends_it(tmp_path: Path, where: str) -> None:
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("where", ["stuck", "collecting", "importing"])
+def test_an_interruption_ends_it(tmp_path: Path, where: str, kind: int) -> None:
     (tmp_path / "modules" / "numpy").mkdir(parents=True)
     (tmp_path / "folder").mkdir()
     path = [str(Path(__file__).parents[2])]
-    command = [sys.executable, "-c", STUCK]
+    command = [sys.executable, "-c", COLLECTING if where == "collecting" else STUCK]
     if where == "importing":
         (tmp_path / "modules" / "numpy" / "__init__.py").write_text(IMPORTING)
         path.insert(0, str(tmp_path / "modules"))
@@ -119,7 +155,7 @@ def test_an_interruption_ends_it(tmp_path: Path, where: str) -> None:
     )
     assert process.stdout is not None
     assert process.stdout.readline() == b"ready\n"
-    process.send_signal(signal.SIGINT)
+    process.send_signal(kind)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
     assert said == b"jflnr: interrupted; no partial file is left\n"

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from jflnr.cli import main
 from jflnr.parameters import load_parameters, numbers_of
 from jflnr.regression.adaptive import AdaptiveFLR
+from tests.fuzz.test_files import little_memory
 
 short = functools.partial(settings, deadline=None, derandomize=True, database=None)
 long = functools.partial(settings, deadline=None, database=None)
@@ -103,6 +104,7 @@ FILES = st.one_of(
 )
 
 
+@little_memory()
 def loads_or_refuses(folder, content):
     path = folder / "p.json"
     path.write_bytes(content)
@@ -123,7 +125,7 @@ def test_any_parameter_file(tmp_path, content):
 
 
 @pytest.mark.slow
-@long(max_examples=20000, suppress_health_check=reuse)
+@long(max_examples=25000, suppress_health_check=reuse)
 @given(content=FILES)
 def test_any_parameter_file_long(tmp_path, content):
     loads_or_refuses(tmp_path, content)

@@ -1,7 +1,9 @@
 """Damaged files of weights and histories: exactly what was written, or one sentence."""
 
+import contextlib
 import functools
 import io
+import resource
 
 import jax
 import numpy as np
@@ -33,12 +35,25 @@ def damaged(content, how, where, what):
     return content[:at] + what + content[rest:]
 
 
+# What a file of less than a megabyte may take.
+MOST = 512 * 2**20
+
+
+@contextlib.contextmanager
+def little_memory():
+    peak = lambda: 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = peak()
+    yield
+    assert peak() - before < MOST
+
+
 @functools.cache
 def shipped(method):
     path = weights.FOLDER / f"{method}.npz"
     return path.read_bytes(), weights.load(path)[0]
 
 
+@little_memory()
 def weights_are_whole_or_refused(folder, method, damage):
     content, whole = shipped(method)
     path = folder / "weights.npz"
@@ -61,7 +76,7 @@ def test_weights(tmp_path, method, damage):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", NETWORKS)
-@long(max_examples=3000, suppress_health_check=reuse)
+@long(max_examples=12500, suppress_health_check=reuse)
 @given(damage=DAMAGE)
 def test_weights_long(tmp_path, method, damage):
     weights_are_whole_or_refused(tmp_path, method, damage)
@@ -77,6 +92,7 @@ def written(folder):
     return path.read_bytes()
 
 
+@little_memory()
 def history_is_whole_or_refused(folder, damage):
     path = folder / "history"
     path.write_bytes(damaged(written(folder), *damage))
@@ -95,7 +111,7 @@ def test_history(tmp_path, damage):
 
 
 @pytest.mark.slow
-@long(max_examples=10000, suppress_health_check=reuse)
+@long(max_examples=25000, suppress_health_check=reuse)
 @given(damage=DAMAGE)
 def test_history_long(tmp_path, damage):
     history_is_whole_or_refused(tmp_path, damage)

@@ -1,9 +1,11 @@
 """What other people's files do: odd channels, signs, values, and text that nobody vouches for."""
 
 import json
+import struct
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from jflnr import exr, layouts
@@ -145,3 +147,33 @@ def test_text_that_is_not_utf8(tmp_path: Path, frame: Frame, capsys: pytest.Capt
     assert (others["artist"], others["by"]) == ("Joseé", "éébyéé")
     for name, pixels in picture_of(frame).items():
         np.testing.assert_array_equal(exr.read_channels(path)[name], pixels)
+
+
+def test_names_that_are_not_utf8(tmp_path: Path, frame: Frame) -> None:
+    """Of channels and of attributes; each keeps its pixels, whole and in pieces."""
+    path, channels = tmp_path / "a.exr", picture_of(frame)
+    odd = {"A~.R": channels["R"], "Z~~.X": channels["G"], "zz~": channels["B"]}
+    exr.write_channels(path, channels | odd, others={"au~": "x"})
+    for name in (*odd, "au~"):
+        ended = name.encode() + b"\0"
+        path.write_bytes(path.read_bytes().replace(ended, ended.replace(b"~", b"\xe9"), 1))
+    found = exr.read_channels(path)
+    for name, pixels in (channels | odd).items():
+        np.testing.assert_array_equal(found[name.replace("~", "é")], pixels)
+    assert exr.read_attributes(path).others["aué"] == "x"
+    pytest.importorskip("OpenImageIO")
+    from jflnr.large.scanlines import Scanlines
+
+    assert set(Scanlines(path, None, {}).channels) == set(found)
+
+
+def test_tiles_far_larger_than_the_image_are_refused(tmp_path: Path) -> None:
+    """Memory for a tile would be taken before it is known to be damaged."""
+    path, tiles = tmp_path / "a.exr", OpenEXR.TileDescription()
+    header = {"type": OpenEXR.tiledimage, "tiles": tiles}
+    OpenEXR.File(header, {"R": np.zeros((8, 8), np.float32)}).write(str(path))
+    tile = struct.pack("<2I", tiles.xSize, tiles.ySize)
+    assert path.read_bytes().count(tile) == 1
+    path.write_bytes(path.read_bytes().replace(tile, struct.pack("<2I", 32, 6160416)))
+    with pytest.raises(ValueError, match="announces tiles of 32 x 6160416 pixels"):
+        exr.read_channels(path)

@@ -91,21 +91,33 @@ def test_going_on_gives_the_same_weights(records, settings, tmp_path, monkeypatc
     whole = train.train(records, [], settings, steps=4)
     state = tmp_path / "state"
 
-    class Interrupted(Exception):
-        pass
-
     def stop(entry):
-        raise Interrupted
+        raise KeyboardInterrupt
 
-    with pytest.raises(Interrupted):
-        train.train(records, [], settings, steps=4, state_file=state, report=stop)
+    half = train.train(records, [], settings, steps=4, state_file=state, report=stop)
+    assert half.stopped and half.best.step == 2
     rest = train.train(records, [], settings, steps=4, state_file=state)
     for name, value in whole.params.items():
         np.testing.assert_array_equal(rest.params[name], value)
-    assert [entry.step for entry in rest.history] == [0, 2, 4]
+    assert [entry.step for entry in rest.history] == [0, 2, 2, 4]
     other = dataclasses.replace(settings, seed=1)
     with pytest.raises(ValueError, match="another run"):
         train.train(records, [], other, steps=4, state_file=state)
+
+
+def test_time_counts_from_the_first_step(records, settings, monkeypatch):
+    """The clock here is moved by the updates: by the first one, which compiles, an hour."""
+    moves = [1.0, 1.0, 1.0, 3600.0]
+    clock = [0.0]
+    real = train._update()
+
+    def update(*given):
+        clock[0] += moves.pop()
+        return real(*given)
+
+    monkeypatch.setattr(train, "_update", lambda: update)
+    monkeypatch.setattr(train.time, "monotonic", lambda: clock[0])
+    assert train.train(records, [], settings, seconds=3).best.step == 3
 
 
 def test_a_state_that_is_none_is_refused(records, settings, tmp_path):

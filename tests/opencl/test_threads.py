@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+import jflnr
 from experiments import threads
 from jflnr.opencl import Context
 
@@ -26,24 +27,23 @@ def test_threads_get_what_one_gets(
 
 
 FORKED = """
-import os
-import numpy as np
-import jflnr
-from jflnr.opencl import NoDevice, flr
-image = np.random.default_rng(0).random((20, 30, 3), np.float32)
-parameters = jflnr.FLR(12, 1e-3, 1e-4)
-flr(image, image, parameters)
+import os, sys
+from experiments.threads import made_up
+from jflnr import Denoiser
+denoise, (frame,) = Denoiser("flr", backend=sys.argv[1]), made_up(1)
+denoise(frame)
 if os.fork() == 0:
     try:
-        flr(image, image, parameters)
-    except NoDevice as error:
+        denoise(frame)
+    except (ImportError, RuntimeError) as error:
         print(error, flush=True)
     os._exit(0)
 os.wait()
 """
 
 
-def test_a_fork_after_use_is_one_sentence(context: Context) -> None:
-    command = [sys.executable, "-W", "ignore", "-c", FORKED]
+@pytest.mark.parametrize("backend", jflnr.BACKENDS)
+def test_a_fork_after_use_is_one_sentence(context: Context, backend: str) -> None:
+    command = [sys.executable, "-W", "ignore", "-c", FORKED, backend]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert "start processes with" in done.stdout and not done.stderr

@@ -14,6 +14,7 @@ from jflnr.regression.elimination import (
     factor,
     substitute,
 )
+from jflnr.regression.flr import FLR, flr
 from jflnr.regression.moments import centre, collect, index_xx, index_xy, plane_count
 
 
@@ -41,6 +42,22 @@ def test_centre_ignores_what_is_not_finite():
     guides[::3, :, 0] = np.nan
     guides[:, :, 1] = np.inf
     np.testing.assert_allclose(centre(jnp.asarray(guides)), [7, 0], rtol=1e-5)
+
+
+@pytest.mark.parametrize("sigma", [5.0, 40.0])
+def test_the_window_reaches_as_far_where_its_width_is_traced(rng, sigma):
+    y, x = rng.random((90, 50, 3), np.float32), rng.random((90, 50, 2), np.float32)
+    plain = flr(y, x, FLR(sigma))
+    traced = jax.jit(lambda method: flr(y, x, method))(FLR(sigma))
+    several = jax.vmap(lambda s: flr(y, x, FLR(s)))(jnp.array([1.0, sigma]))[1]
+    for found in (traced, several):
+        np.testing.assert_allclose(found, plain, rtol=1e-4, atol=1e-5)
+
+
+def test_sizes_far_beyond_the_frame_are_clamped(rng):
+    y, x = rng.random((90, 50, 3), np.float32), rng.random((90, 50, 2), np.float32)
+    found, wanted = flr(y, x, block=10**9, support=10**9), flr(y, x, block=128)
+    np.testing.assert_allclose(found, wanted, rtol=1e-4)
 
 
 def test_taps_are_a_gaussian_and_vanishing_width_is_the_identity():
