@@ -225,7 +225,7 @@ def _window(rng: np.random.Generator, seen: Seen) -> Things:
 
 
 KINDS: tuple[tuple[Callable[[np.random.Generator, Seen], Things], float], ...] = (
-    (_standing, 0.25),
+    (_standing, 0.27),
     (_vase, 0.06),
     (_bulbs, 0.1),
     (_mirror, 0.11),
@@ -234,6 +234,6 @@ KINDS: tuple[tuple[Callable[[np.random.Generator, Seen], Things], float], ...] =
     (_wires, 0.1),
     (_bars, 0.07),
     (_grass, 0.06),
-    (_leaves, 0.05),
+    (_leaves, 0.03),
     (_window, 0.05),
 )
