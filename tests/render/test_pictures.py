@@ -15,8 +15,11 @@ from experiments.rendering import frame, materials, pictures
 from experiments.rendering.camera import looking
 from experiments.rendering.picture import FILTER, Film, Lens, Shading, filter_offsets
 from experiments.rendering.scene import build
+from experiments.rendering.scenes import finishes
+from experiments.rendering.scenes.catalogue import FAMILIES, world_of
 from experiments.rendering.scenes.geometry import quad, sphere
-from experiments.rendering.scenes.world import Finish, Material, Surface, World, plain
+from experiments.rendering.scenes.props import KINDS, Seen
+from experiments.rendering.scenes.world import Ball, Finish, Material, Surface, World, plain
 from experiments.rendering.source import load
 from jflnr import read_frame
 from jflnr.camera import Camera
@@ -172,3 +175,31 @@ def test_a_scene_file_gets_materials_too() -> None:
     scene, found = materials._file(source.path, np.random.default_rng(2))
     assert {shape.id() for shape in scene.shapes()} == set(found)
     assert len({finish.kind for finish in found.values()}) > 1
+
+
+@pytest.mark.parametrize("kind", [kind for kind, _ in KINDS], ids=lambda kind: kind.__name__[1:])
+def test_things_are_sound_and_of_the_size_of_what_is_seen(kind: Any) -> None:
+    rng = np.random.default_rng(4)
+    way = np.array([[0, 1, 0], [0, 0, 1.0], [1, 0, 0]], np.float32)
+    seen = Seen(looking([0, 1, 5], [0, 1, 0], 60.0), rng.normal(size=(3, 3)).astype("f4"), way,
+                np.array([4, 5, 6], np.float32))  # fmt: skip
+    for _ in range(6):
+        for thing in kind(rng, seen):
+            if isinstance(thing, Ball):
+                assert 0 < thing.radius < 0.5 and min(thing.radiance) > 0
+                continue
+            mesh = thing.mesh
+            assert np.isfinite(mesh.vertices).all() and mesh.faces.max() < len(mesh.vertices)
+            assert np.abs(mesh.vertices).max() < 20
+            np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-4)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_surfaces_of_a_family_get_finishes_by_seed(family: str) -> None:
+    world = world_of(f"{family}-7")
+    made, again = (finishes.dressed(world, np.random.default_rng(1)) for _ in range(2))
+    kinds = [surface.material.finish for surface in made.surfaces]
+    assert kinds == [surface.material.finish for surface in again.surfaces]
+    assert len({finish.kind for finish in kinds}) > 1
+    for before, after in zip(world.surfaces, made.surfaces, strict=True):
+        assert after.mesh is before.mesh and after.radiance == before.radiance
