@@ -11,7 +11,15 @@ import numpy as np
 
 from jflnr.regression.arguments import check_regression
 from jflnr.regression.level import brightness, mean_guides
-from jflnr.regression.moments import Guides, centre, collect, index_xx, index_xy, magnitude
+from jflnr.regression.moments import (
+    Guides,
+    centre,
+    channels_of,
+    collect,
+    index_xx,
+    index_xy,
+    magnitude,
+)
 
 
 class Collected(NamedTuple):
@@ -28,17 +36,7 @@ class Collected(NamedTuple):
 
     @property
     def channels(self) -> int:
-        count = self.shift.size + 1
-        return (self.moments.shape[0] - count * (count + 1) // 2) // count
-
-    def of_guides(self, kept: Sequence[int]) -> Collected:
-        """As if only these guides had been collected: a sub-matrix of the same moments."""
-        rows = [0, *(q + 1 for q in kept)]
-        planes = [index_xx(i, j) for n, i in enumerate(rows) for j in rows[: n + 1]]
-        count, channels = self.shift.size, self.channels
-        planes += [index_xy(i, c, count, channels) for i in rows for c in range(channels)]
-        shift = self.shift[np.array(kept, int)]
-        return self._replace(moments=self.moments[np.array(planes)], shift=shift)
+        return channels_of(self.moments, self.shift.size)
 
     def light(self) -> jax.Array:
         """Moments of the brightness alone."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from jax import random
 
+from experiments.peers import paper_network as paper
 from jflnr.auto import nested
 from jflnr.bmfr import fit as bmfr_fit
 from jflnr.bmfr import pipeline as bmfr
@@ -13,7 +14,6 @@ from jflnr.bmfr import taa as bmfr_taa
 from jflnr.frame import Frame, composite
 from jflnr.images.noisy_guides import smooth_guide
 from jflnr.network import flnr as networks
-from jflnr.network import paper
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.energy import rescale, restore

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jflnr.network import paper
+from experiments.peers import paper_network as paper
 from jflnr.regression.flr import DEFAULT, flr
 
 WIDTHS = (2, 3, 4)
