@@ -21,10 +21,10 @@ from jflnr.images.noisy_guides import smooth_guide
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
 from jflnr.regression import adaptive
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.arguments import channel_count, check_regression, layers_of
+from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
+from jflnr.regression.arguments import layers_of
 from jflnr.regression.moments import Guides
-from jflnr.stages import Known, Parts, Stage, regress
+from jflnr.stages import Known, Parts, Stage
 
 # Guides that the network was trained with: normal (3), depth and, where a frame has it, occlusion.
 NEEDED, GUIDES = ("normal", "depth"), ("normal", "depth", "ao")
@@ -116,29 +116,14 @@ class FLNR(AdaptiveFLR):
 DEFAULT = FLNR()
 
 
-def flnr(
-    target: jax.Array,
-    guides: Guides,
-    method: FLNR = DEFAULT,
-    *,
-    weight: jax.Array | None = None,
-    **options: Any,
-) -> Any:
+def flnr(target: jax.Array, guides: Guides, method: FLNR = DEFAULT, **options: Any) -> Any:
     """Denoise with the network's help. Scales with `target`.
 
     target: `(H, W, C)`, the noisy radiance, not negative; C is 3, or 6, 9, ... for light groups,
     whose results sum to the denoised sum. guides: `(H, W, 5)` or several arrays: normal, depth over
-    its typical value, ambient occlusion, which may be missing. method, options: as of
-    `flr_adaptive`. weight: `(H, W)`, a mask; 0 removes a pixel, as does any value that is not
-    finite.
-    Returns `(H, W, C)`; `with_error` also `(H, W, 1)`, the standard error of its brightness.
-
-    Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
+    its typical value, ambient occlusion, which may be missing. All else as of `flr_adaptive`.
     """
-    check_regression(target, guides, None, weight)
-    method = dataclasses.replace(method, **options).ready(channel_count(guides), target.shape[2])
-    given = regress(method, {"target": target, "guides": guides, "weight": weight})
-    return (given["image"], given["error"]) if method.with_error else given["image"]
+    return flr_adaptive(target, guides, method, **options)
 
 
 def init(key: jax.Array, widths: Sequence[int]) -> unet.Params:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -43,21 +44,14 @@ class Step(NamedTuple):
     share: Grid
 
 
+# The light, the guides and what each pixel counts, on the device.
+Images: TypeAlias = "tuple[Any, tuple[Any, ...], Any | None]"
+
 # Light above this is divided by a power of two first: its squares would leave float32.
 BRIGHT = 1e15
 
 
-def flr_adaptive(
-    target: Any,
-    guides: Any,
-    method: AdaptiveFLR = DEFAULT,
-    *,
-    weight: Any | None = None,
-    context: Context | None = None,
-    out: Any | None = None,
-    on_device: bool = False,
-    **options: Any,
-) -> Any:
+def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flr_adaptive` on an OpenCL device: same arguments, same result.
 
     target, guides and weight may be arrays of numpy or JAX, or device arrays; context, out and
@@ -66,23 +60,45 @@ def flr_adaptive(
 
     Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
     """
+    return regress(write, target, guides, method, **options)
+
+
+def regress(
+    write: Callable[[Context, Images, Any, Any], None],
+    target: Any,
+    guides: Any,
+    method: Any,
+    *,
+    weight: Any | None = None,
+    context: Context | None = None,
+    out: Any | None = None,
+    on_device: bool = False,
+    **options: Any,
+) -> Any:
+    """What `flr_adaptive` returns. write: the result, from images and method, to a device array."""
     context = default_context() if context is None else context
     method = dataclasses.replace(method, **options)
     if method.with_error:
         raise ValueError("the standard error is told on the jax backend only")
     check_regression(target, guides, None, weight)
     check_counts(channel_count(guides), target.shape[2])
+    method = method.ready(channel_count(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
     pixels, unit = in_unit(target)
-    images = context.array(pixels), to_layers(context, guides)
-    counts = to_weight(context, weight)
-    image = context.empty(target.shape) if method.keep_energy else output
-    write_light(context, *images, counts, method, image)
-    if method.keep_energy:
-        rescale(context, image, images[0], counts, output)
+    images = context.array(pixels), to_layers(context, guides), to_weight(context, weight)
+    write(context, images, method, output)
     if unit != 1:
         context.scale(output, unit)
     return context.finish(output, result)
+
+
+def write(context: Context, images: Images, method: AdaptiveFLR, output: Any) -> None:
+    """Write the light, `(H, W, C)`, with the brightness of the input if that is to be kept."""
+    target, _, weight = images
+    image = context.empty(target.shape) if method.keep_energy else output
+    write_light(context, *images, method, image)
+    if method.keep_energy:
+        rescale(context, image, target, weight, output)
 
 
 def in_unit(target: Any) -> tuple[Any, np.float32]:

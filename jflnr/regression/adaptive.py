@@ -18,7 +18,7 @@ from jflnr.images.inputs import robust_images, same_size
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression import energy
 from jflnr.regression.apply import apply
-from jflnr.regression.arguments import check_options, check_regression
+from jflnr.regression.arguments import channel_count, check_options, check_regression
 from jflnr.regression.floor import with_own_light
 from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
 from jflnr.regression.moments import (
@@ -98,6 +98,10 @@ class AdaptiveFLR:
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> AdaptiveFLR:
         same_size(frame, self.name)
+        return self
+
+    def ready(self, guides: int, channels: int) -> AdaptiveFLR:
+        """With all that it needs for so many guides and channels of light."""
         return self
 
     def known(self, images: Parts) -> Known:
@@ -191,6 +195,7 @@ def flr_adaptive(
     """
     method = dataclasses.replace(method, **options)
     check_regression(target, guides, None, weight)
+    method = method.ready(channel_count(guides), target.shape[-1])
     given = regress(method, {"target": target, "guides": guides, "weight": weight})
     return (given["image"], given["error"]) if method.with_error else given["image"]
 
