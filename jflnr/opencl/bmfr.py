@@ -12,6 +12,7 @@ from jflnr.frame import Frame
 from jflnr.opencl.arguments import to_output
 from jflnr.opencl.bmfr_fit import fit
 from jflnr.opencl.context import Context, default_context, is_device_array
+from jflnr.opencl.moments import guide_defines, run_on_rows
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 
 
@@ -93,7 +94,7 @@ def accumulate_light(
         before.depth, before.position, history.samples, history.light, light, count, accepted,
     )  # fmt: skip
     defines = {"MOST": pipeline.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
-    run_on_rows(context, "accumulate_light", (width, height), arguments, defines)
+    run(context, "accumulate_light", layers, arguments, defines)
     return light, count, accepted
 
 
@@ -113,7 +114,7 @@ def accumulate_fitted(
         method.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
         history.fitted, mean, picture,
     )  # fmt: skip
-    run_on_rows(context, "accumulate_fitted", (width, height), arguments)
+    run(context, "accumulate_fitted", layers, arguments)
     return mean, picture
 
 
@@ -127,30 +128,23 @@ def taa(
     image: Any,
 ) -> Any:
     """Phase III: the smoothed picture, `(H, W, 3)`; writes `image`, the same without albedo."""
-    height, width = mean.shape[:2]
     smooth = context.empty(mean.shape)
     arguments = (
         method.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
         layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
-    run_on_rows(context, "taa", (width, height), arguments)
+    run(context, "taa", layers, arguments)
     return smooth
 
 
-def run_on_rows(
+def run(
     context: Context,
     name: str,
-    size: tuple[int, int],
+    layers: dict[str, Any],
     arguments: tuple[Any, ...],
     defines: dict[str, int] | None = None,
 ) -> None:
-    """Enqueue kernels_cl/bmfr/`name`.cl over vectors of neighbours, which may overlap.
-
-    size: width and height of the frame.
-    """
-    width, height = size
-    lanes = context.width() if width >= context.width() else 1
-    channels = {"Q": 6, "C": 3, "PART_0": 3, "PART_1": 3, "PART_2": 0, "PART_3": 0, "PART_4": 0}
-    defines = {**channels, "WIDTH": lanes, **(defines or {})}
-    groups = -(-width // lanes), height
-    context.run(name, f"bmfr/{name}.cl", defines, groups, (width, height, *arguments))
+    """Enqueue kernels_cl/bmfr/`name`.cl on all pixels."""
+    height, width = layers["motion"].shape[:2]
+    defines = guide_defines((layers["normal"], layers["position"]), 3) | (defines or {})
+    run_on_rows(context, name, f"bmfr/{name}.cl", defines, (width, height, *arguments))

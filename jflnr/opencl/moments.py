@@ -25,6 +25,22 @@ def guide_arguments(guides: tuple[Any, ...]) -> tuple[Any, ...]:
     return (*guides, *(None for _ in range(PARTS - len(guides))))
 
 
+def run_on_rows(
+    context: Context,
+    name: str,
+    file: str,
+    defines: dict[str, Any],
+    arguments: tuple[Any, ...],
+) -> None:
+    """Enqueue a kernel over vectors of neighbours in a row, which may overlap.
+
+    arguments: the first two are width and height of the frame.
+    """
+    width, height = arguments[:2]
+    lanes = context.width() if width >= context.width() else 1
+    context.run(name, file, {**defines, "WIDTH": lanes}, (-(-width // lanes), height), arguments)
+
+
 def weight_defines(weight: Any | None) -> dict[str, int]:
     """The defines of kernels_cl/moments.cl for weights `(H, W)`, float32 or bool, or None."""
     if weight is None:

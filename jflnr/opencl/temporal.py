@@ -15,14 +15,13 @@ from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.bmfr import to_device
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
+from jflnr.opencl.moments import guide_defines, run_on_rows
 from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 from jflnr.temporal.sequence import State, Temporal, prepared
-
-PARTS = {f"PART_{i}": 0 for i in range(5)}
 
 
 def start(frame: Frame, context: Context | None = None) -> State:
@@ -105,11 +104,8 @@ def reproject(
         places[0], before.normal, before.depth, places[1], *state.light, *state.image, *light,
         *image, expected, known,
     )  # fmt: skip
-    lanes = context.width() if width >= context.width() else 1
-    defines = {"Q": 0, "C": 3, "WIDTH": lanes, **PARTS, **brightness_defines(3)}
-    defines |= {"DEPTHS": 1} if depths else {}
-    size = -(-width // lanes), height
-    context.run("reproject", "temporal/reproject.cl", defines, size, arguments)
+    defines = guide_defines((), 3) | brightness_defines(3) | ({"DEPTHS": 1} if depths else {})
+    run_on_rows(context, "reproject", "temporal/reproject.cl", defines, arguments)
     return light, image, expected, known
 
 
@@ -129,12 +125,11 @@ def accumulate(
     height, width = image.shape[:2]
     average, weight = _new_average(context, height, width), context.empty((height, width))
     lanes = context.width() if height * width >= context.width() else 1
-    defines = {"Q": 0, "C": 3, "WIDTH": lanes, **PARTS}
     arguments = (
         height * width, least, change.unit, *before, change.signal, change.noise, image, covered,
         *average, weight,
     )  # fmt: skip
-    size = (-(-height * width // lanes),)
+    defines, size = guide_defines((), 3) | {"WIDTH": lanes}, (-(-height * width // lanes),)
     context.run("accumulate", "temporal/accumulate.cl", defines, size, arguments)
     return average, weight
 

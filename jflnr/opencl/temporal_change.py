@@ -13,7 +13,7 @@ from jflnr.opencl.apply import apply
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP, Grid, Run, brightness_defines
 from jflnr.opencl.level import Level, fit_level
-from jflnr.opencl.moments import centre, collect
+from jflnr.opencl.moments import centre, collect, guide_defines, run_on_rows
 from jflnr.regression.adaptive import DEFAULT
 from jflnr.regression.moments import plane_count
 from jflnr.regression.window import REACH
@@ -76,9 +76,7 @@ def _difference(
     """Target `(H, W, 5)` and weight `(H, W)` for the moments, and the unit, `(1,)`."""
     height, width = sample.shape[:2]
     rows, unit = context.empty((height, 2)), context.empty((1,))
-    lanes = context.width() if width >= context.width() else 1
-    defines = {"Q": 0, "C": 5, "WIDTH": lanes, **{f"PART_{i}": 0 for i in range(5)}}
-    defines |= brightness_defines(3)
+    defines = guide_defines((), 5) | brightness_defines(3) | {"WIDTH": context.width()}
     file = "temporal/difference.cl"
     context.run("unit_rows", file, defines, (height,), (width, height, expected, known, rows))
     context.run("unit", file, defines, (1,), (height, rows, unit))
@@ -86,7 +84,7 @@ def _difference(
     arguments = (
         width, height, NUMBERS.offset, sample, light, expected, known, unit, target, weight
     )  # fmt: skip
-    context.run("difference", file, defines, (-(-width // lanes), height), arguments)
+    run_on_rows(context, "difference", file, defines, arguments)
     return target, weight, unit
 
 

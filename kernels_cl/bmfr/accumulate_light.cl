@@ -24,21 +24,15 @@ kernel void accumulate_light(
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
     const long pixel = (long)y * width + x;
-    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
-    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
-
-    const Surface here = surface_here(normal, depth, position, pixel);
-    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
-    const real tolerance = (off_plane + moved) * here.depth;
+    Taps taps = surface_taps(
+        OWN(motion, 2, 0), OWN(motion, 2, 1), x, y, width, height, off_plane, same_normal,
+        surface_here(normal, depth, position, pixel), before_normal, before_depth, before_position);
     mask accepts = 0;
     real samples = 0;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const Surface there =
-            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
         const real known = at(before_count, 1, 0, taps.pixel[i]);
-        const mask accept =
-            alike(here, there, tolerance, same_normal) & (known > 0) & (taps.weight[i] > 0);
+        const mask accept = (known > 0) & (taps.weight[i] > 0);
         taps.weight[i] = accept ? taps.weight[i] : (real)0;
         accepts |= accept ? (mask)(1 << i) : (mask)0;
         samples += taps.weight[i] * known;

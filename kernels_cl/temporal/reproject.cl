@@ -36,18 +36,9 @@ kernel void reproject(
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
     const long pixel = (long)y * width + x;
-    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
-    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
-    const Surface here = surface_here(normal, depth, position, pixel);
-    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
-    const real tolerance = (off_plane + moved) * here.depth;
-#pragma unroll
-    for (int i = 0; i < 4; ++i) {
-        const Surface there =
-            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
-        const mask accept = alike(here, there, tolerance, same_normal);
-        taps.weight[i] = accept ? taps.weight[i] : (real)0;
-    }
+    Taps taps = surface_taps(
+        OWN(motion, 2, 0), OWN(motion, 2, 1), x, y, width, height, off_plane, same_normal,
+        surface_here(normal, depth, position, pixel), before_normal, before_depth, before_position);
     normalise(&taps);
 
     real found[3], brightness = 0;

@@ -50,3 +50,22 @@ INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal
     const mask turned = DOT(here.normal, there.normal) < same_normal;
     return (ABS(apart) <= tolerance) & (turned == 0) & (here.depth > 0) & (there.depth > 0);
 }
+
+// The taps of a pixel, with weight 0 for those of other surfaces; not divided by their sum.
+INLINE Taps surface_taps(
+    real motion_x, real motion_y, int x, int y, int width, int height, float off_plane,
+    float same_normal, Surface here, global const float *before_normal,
+    global const float *before_depth, global const float *before_position)
+{
+    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
+    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
+    const real tolerance = (off_plane + moved) * here.depth;
+#pragma unroll
+    for (int i = 0; i < 4; ++i) {
+        const Surface there =
+            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
+        const mask accept = alike(here, there, tolerance, same_normal);
+        taps.weight[i] = accept ? taps.weight[i] : (real)0;
+    }
+    return taps;
+}
