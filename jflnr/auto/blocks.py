@@ -9,7 +9,6 @@ docs/select.md derives the steps.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from typing import NamedTuple
 
@@ -19,8 +18,8 @@ import numpy as np
 
 from jflnr.auto.collected import Collected, inside
 from jflnr.auto.nested import fit_orders
-from jflnr.auto.weights import weigh, weighted
-from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, mean_light
+from jflnr.auto.weights import SETTINGS, weigh, weighted
+from jflnr.regression.adaptive import mean_light
 from jflnr.regression.energy import restore
 from jflnr.regression.level import Fit, Grid, mean_guides, predict, windowed
 from jflnr.regression.moments import index_xx, index_xy
@@ -34,9 +33,6 @@ from jflnr.regression.window import gather, window_over
 COARSEST = 64
 # Windows of smaller blocks are so narrow that slopes across them are hardly worth their time.
 SLOPES = 16
-# Chosen on train and val. Blocks differ less from their pixels than pixels do, so weights may fall
-# more steeply with brightness than in adaptive FLR.
-SETTINGS = dataclasses.replace(DEFAULT, sigma=2.2, exponent=1.5, offset=0.1, brightness_scale=1.8)
 # Factor on what a group of guides explains of noise: the ridge has taken most of it already.
 ORDER_CAUTION = 0.2
 # Of what the guides do inside a block: how much is expected to be wrong, found on training frames.
@@ -98,18 +94,17 @@ def fit(collected: Collected, groups: tuple[int, ...], block: int) -> tuple[Mode
     Compiled once per size of the grid. groups: numbers of guides that enter together, in order.
     block: side in pixels of the blocks collected, a power of two below half of `COARSEST`.
     """
-    numbers = SETTINGS
     light = collected.light()
     mean = mean_light(jnp.sum(light[0]), jnp.sum(light[index_xy(0, 0, collected.shift.size, 1)]))
-    weights, squares = weigh(collected, light, mean, block, numbers)
+    weights, squares = weigh(collected, light, mean, block)
     finest = weighted(collected, weights, squares, block)
     grids = finest.pyramid((COARSEST // block).bit_length())
-    progress = _widest(grids.pop(), collected, groups, mean, numbers)
+    progress = _widest(grids.pop(), collected, groups, mean)
     for number, grid in enumerate(reversed(grids[1:]), 1):
-        progress = _refined(progress, grid, number, collected, groups, numbers)
+        progress = _refined(progress, grid, number, collected, groups)
     unfinished = Unfinished(weights, squares, progress)
-    progress = _refined(progress, finest, number + 1, collected, groups, numbers, shifted=True)
-    return _models(progress, halve(light), collected, groups, numbers), unfinished
+    progress = _refined(progress, finest, number + 1, collected, groups, shifted=True)
+    return _models(progress, halve(light), collected, groups), unfinished
 
 
 @functools.partial(jax.jit, static_argnames=("groups", "block"))
@@ -117,11 +112,10 @@ def refine(
     collected: Collected, unfinished: Unfinished, groups: tuple[int, ...], block: int
 ) -> Models:
     """Whole models of the blocks collected, from what `fit` left; arguments as there."""
-    numbers = SETTINGS
     grid = weighted(collected, unfinished.weights, unfinished.squares, block)
     number = (COARSEST // block).bit_length() - 1
-    progress = _refined(unfinished.progress, grid, number, collected, groups, numbers)
-    return _models(progress, halve(collected.light()), collected, groups, numbers)
+    progress = _refined(unfinished.progress, grid, number, collected, groups)
+    return _models(progress, halve(collected.light()), collected, groups)
 
 
 def _models(
@@ -129,11 +123,10 @@ def _models(
     light: jax.Array,
     collected: Collected,
     groups: tuple[int, ...],
-    numbers: AdaptiveFLR,
 ) -> Models:
     """What the progress has come to. light: moments of the brightness, on twice larger blocks."""
     count = collected.shift.size
-    coefficients = restore(progress.merged, light, count, numbers.slack)
+    coefficients = restore(progress.merged, light, count, SETTINGS.slack)
     moments = collected.moments[: index_xy(0, 0, count, 0)]
     done = inside(coefficients, moments, groups)
     error = progress.error.square() + DETAIL * progress.level**2 + INSIDE * jnp.sum(done, axis=0)
@@ -156,12 +149,11 @@ def _widest(
     collected: Collected,
     groups: tuple[int, ...],
     mean: jax.Array,
-    numbers: AdaptiveFLR,
 ) -> Progress:
     """The models of the coarsest grid."""
     count = collected.shift.size
-    features = guide_features(grid, count, numbers)
-    fit, order = _fit_grid(grid, features, collected, groups, mean, numbers)
+    features = guide_features(grid, count, SETTINGS)
+    fit, order = _fit_grid(grid, features, collected, groups, mean)
     level = predict(fit.coefficients, mean_guides(grid.moments, count))
     zero, one = jnp.zeros_like(order), jnp.ones_like(order)
     merged = fit.coefficients
@@ -174,7 +166,6 @@ def _refined(
     number: int,
     collected: Collected,
     groups: tuple[int, ...],
-    numbers: AdaptiveFLR,
     shifted: bool = False,
 ) -> Progress:
     """One grid finer: of its models, as much of the difference to the coarser ones as is signal.
@@ -188,12 +179,12 @@ def _refined(
 
     def own_fit(known: Known) -> Fit:
         if shifted:
-            return _shift_grid(grid, known, collected, numbers)
+            return _shift_grid(grid, known, collected)
         slopes = grid.block >= SLOPES
-        fine, found[0] = _fit_grid(grid, known.features, collected, groups, mean, numbers, slopes)
+        fine, found[0] = _fit_grid(grid, known.features, collected, groups, mean, slopes)
         return fine
 
-    step = refine_grid(grid, last.fit, last.merged, count, mean, numbers, own_fit)
+    step = refine_grid(grid, last.fit, last.merged, count, mean, SETTINGS, own_fit)
     return Progress(
         mean=mean,
         fit=step.fine,
@@ -210,14 +201,13 @@ def _shift_grid(
     grid: Grid,
     known: Known,
     collected: Collected,
-    numbers: AdaptiveFLR,
 ) -> Fit:
     """The models of a coarser grid, each shifted by the mean of what it leaves under the window.
 
     Sums of a few planes instead of moments and a solve.
     """
     count, channels = collected.shift.size, collected.channels
-    window, coarse = window_over(known.features, numbers.sigma), known.coarse
+    window, coarse = window_over(known.features, SETTINGS.sigma), known.coarse
     sums = grid.moments[np.array([index_xx(i, 0) for i in range(count + 1)])]
     light = grid.moments[index_xy(0, 0, count, channels) :][:channels]
     left = light - jnp.einsum("qchw,qhw->chw", coarse.coefficients, sums)
@@ -234,7 +224,6 @@ def _fit_grid(
     collected: Collected,
     groups: tuple[int, ...],
     mean: jax.Array,
-    numbers: AdaptiveFLR,
     slopes: bool = True,
 ) -> tuple[Fit, jax.Array]:
     """The models of one grid, all orders averaged, and how many groups are in them, `(h, w)`.
@@ -242,7 +231,7 @@ def _fit_grid(
     slopes: whether the position in the window is a last group of two guides.
     """
     shift, channels = collected.shift, collected.channels
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    system = windowed(grid, features, shift, channels, mean, SETTINGS, slopes=slopes)
     regular = system.eps, system.eps_prime
     noise = ORDER_CAUTION * system.variance
     all_groups = (*groups, 2) if slopes else groups
