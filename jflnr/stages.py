@@ -37,6 +37,11 @@ class Stage:
     learn: Callable[[Any, Known, dict[str, Any]], Known] | None = None
     composes: bool = False
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those of what it gives."""
+        return tuple(name for name, _ in self.gives)
+
 
 def run(stages: Sequence[Stage], method: Any, parts: Parts, known: Known) -> tuple[Parts, Known]:
     """All stages on a whole frame: the arrays of each and all that became known."""
@@ -57,7 +62,7 @@ def regress(method: Any, images: Parts, composed: bool = True) -> Parts:
     """
     stages = [stage for stage in method.stages() if composed or not stage.composes]
     parts, _ = run(stages, method, images, method.known(images))
-    return {name: parts[name] for name, _ in stages[-1].gives}
+    return {name: parts[name] for name in stages[-1].names}
 
 
 def compose(method: Any, parts: Parts) -> Any | None:

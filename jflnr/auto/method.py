@@ -162,7 +162,8 @@ def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
     scene, ao, collected = _collect(frame, names, block)
     frame = dataclasses.replace(frame, ao=frame.ao if ao is None else ao)
     groups = tuple(getattr(frame, name).shape[-1] for name in names)
-    return Fitted(frame, scene, collected, *fit(collected, groups, block), names, groups, block)
+    models, unfinished = fit(collected, groups, block)
+    return Fitted(frame, scene, collected, models, unfinished, names, groups, block)
 
 
 def _finished(fitted: Fitted, form: str) -> Models:

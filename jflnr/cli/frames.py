@@ -216,8 +216,7 @@ class Worker:
         given = denoiser(frame)
         if not isinstance(given, tuple):
             return {"image": given}
-        method = denoiser.method_for(frame)
-        names = [name for name, _ in method.stages()[-1].gives]
+        names = denoiser.method_for(frame).stages()[-1].names
         return dict(zip(names, given, strict=True))
 
     def _write(self, done: Denoised) -> Record:

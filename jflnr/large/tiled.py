@@ -107,7 +107,7 @@ def strips(
             _complete(job, stage)
         for y, x in job.places(last):
             given = job.run(last, y, x)
-            yield y.start, {name: np.asarray(given[name])[y.kept] for name, _ in last.gives}
+            yield y.start, {name: np.asarray(given[name])[y.kept] for name in last.names}
 
 
 def _complete(job: Job, stage: Stage) -> None:

@@ -92,13 +92,12 @@ class FLNR(AdaptiveFLR):
     def stages(self) -> tuple[Stage, ...]:
         side = self.finest
         *before, fits, _ = AdaptiveFLR.stages(dataclasses.replace(self, keep_energy=False))
-        given = tuple(name for name, _ in fits.gives)
         scales = unet.scales_of(self.ready(5, COLOURS).params)
-        gives = (("image", 0), *([("error", 0)] if self.with_error else []))
+        gives = (("image", 0), *[("error", 0)] * self.with_error)
         return (
             *before,
             fits,
-            Stage(evaluate, (("fitted", 0), ("noise", 0)), given, pixels=True, reach=2 * side),
+            Stage(evaluate, (("fitted", 0), ("noise", 0)), fits.names, pixels=True, reach=2 * side),
             Stage(
                 correct,
                 (("image", 0),),
