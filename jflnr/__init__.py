@@ -1,4 +1,3 @@
-# ruff: noqa: F401
 """Denoising of one-sample path-traced light by Fast Local (Neural) Regression."""
 
 import importlib

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from jflnr.lazy import jnp
+from jflnr.lazy import jit, jnp
 
 # Arrays by name. Pixels lie in `(H, W, C)`, what is on blocks in `(..., h, w)`.
 Parts: TypeAlias = dict[str, Any]
@@ -63,6 +64,12 @@ def regress(method: Any, images: Parts, composed: bool = True) -> Parts:
     stages = [stage for stage in method.stages() if composed or not stage.composes]
     parts, _ = run(stages, method, images, method.known(images))
     return {name: parts[name] for name in stages[-1].names}
+
+
+@functools.partial(jit, static_argnames="names")
+def on_frame(method: Any, frame: Any, names: tuple[str, ...]) -> Parts:
+    """`regress` on the images that the method makes of a whole frame."""
+    return regress(method, method.images(frame, names))
 
 
 def compose(method: Any, parts: Parts) -> Any | None:

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -27,7 +27,7 @@ from jflnr.regression.adaptive import light_of
 from jflnr.regression.apply import apply
 from jflnr.regression.energy import rescale
 from jflnr.regression.floor import with_own_light
-from jflnr.stages import regress
+from jflnr.stages import on_frame
 
 
 @jax.tree_util.register_dataclass
@@ -70,18 +70,13 @@ class Auto:
         plan, fitted = _planned(frame, names, limits)
         if plan.form not in plans.BLOCKS:
             method = method_of(plan.form, keep_energy=self.keep_energy).for_frame(frame, names)
-            return plan, _regress(method, frame, names)
+            return plan, on_frame(method, frame, names)["image"]
         if plans.COLLECTED[plan.form] != fitted.block:
             fitted = _fitted(frame, names, plan.form)
         models = _finished(fitted, plan.form)
         plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
         used = tuple(names.index(name) for name in plan.guides)
         return plan, _image(fitted, models, used, self.keep_energy)
-
-
-@functools.partial(jax.jit, static_argnames="names")
-def _regress(method: Any, frame: Frame, names: tuple[str, ...]) -> jax.Array:
-    return regress(method, method.images(frame, names))["image"]
 
 
 def select(

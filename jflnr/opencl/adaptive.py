@@ -60,10 +60,10 @@ def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **opti
 
     Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
     """
-    return regress(write, target, guides, method, **options)
+    return run_on_images(write, target, guides, method, **options)
 
 
-def regress(
+def run_on_images(
     write: Callable[[Context, Images, Any, Any], None],
     target: Any,
     guides: Any,

@@ -7,14 +7,14 @@ from typing import Any
 
 from jflnr.network.flnr import DEFAULT, FLNR
 from jflnr.opencl import network
-from jflnr.opencl.adaptive import Images, regress, write_light
+from jflnr.opencl.adaptive import Images, run_on_images, write_light
 from jflnr.opencl.context import Context
 from jflnr.opencl.energy import rescale
 
 
 def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flnr` on an OpenCL device; all else as of `jflnr.opencl.flr_adaptive`."""
-    return regress(write, target, guides, method, **options)
+    return run_on_images(write, target, guides, method, **options)
 
 
 def write(context: Context, images: Images, method: FLNR, output: Any) -> None:
