@@ -122,7 +122,7 @@ class Denoiser:
 
     def _checked(self, method: Any) -> Any:
         """The method, if it can do what is asked for."""
-        if self.backend not in method.backends:
+        if self.backend not in getattr(method, "backends", BACKENDS):
             raise ValueError(f"method {method.name} runs on the jax backend only")
         if self.guides is not None and (own := getattr(method, "features", None)):
             raise ValueError(

@@ -220,10 +220,26 @@ class Worker:
         return dict(zip(names, given, strict=True))
 
     def _write(self, done: Denoised) -> Record:
-        start = time.perf_counter()
-        _write(done, self.arguments)
+        """Write what is not there: the EXR, with the input's header and windows, and the preview."""
+        from jflnr import exr
+        from jflnr.cli.preview import write_preview
+        from jflnr.metrics import exposure
+
+        start, arguments = time.perf_counter(), self.arguments
+        job, source, frame, result, about, record = done
+        missing = lambda path: arguments.overwrite or not path.exists()
+        if missing(job.target):
+            channels = channels_of(source, frame, result, arguments)
+            comments = json.dumps(source.header | {"denoiser": about})
+            window, others = source.attributes.window, source.attributes.others
+            exr.write_channels(job.target, channels, comments, window, others)
+        if arguments.png and missing(job.preview):
+            # The sky or a lamp in view would darken the room: the brightness is set on reflected
+            # light.
+            scale = exposure(np.nan_to_num(result.lit))
+            write_preview(job.preview, result.picture, scale)
         self.exr_seconds["write"] += time.perf_counter() - start
-        return _record(done.job) | {"status": "written"} | done.record
+        return _record(job) | {"status": "written"} | record
 
 
 def failure(job: Job, error: BaseException) -> Record:
@@ -236,21 +252,3 @@ def failure(job: Job, error: BaseException) -> Record:
 
 def _record(job: Job) -> Record:
     return {"input": str(job.source), "output": str(job.target)}
-
-
-def _write(done: Denoised, arguments: argparse.Namespace) -> None:
-    """Write what is not there: the EXR, with the input's header and windows, then the preview."""
-    from jflnr import exr
-    from jflnr.cli.preview import write_preview
-    from jflnr.metrics import exposure
-
-    job, source, frame, result, about, _ = done
-    missing = lambda path: arguments.overwrite or not path.exists()
-    channels = channels_of(source, frame, result, arguments)
-    comments = json.dumps(source.header | {"denoiser": about})
-    attributes = source.attributes
-    if missing(job.target):
-        exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
-    if arguments.png and missing(job.preview):
-        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
+import itertools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,7 +93,7 @@ def train(
         raise ValueError("there are no frames to train on")
     params = flnr.init(jax.random.key(settings.seed), settings.widths)
     state, best = adam.start(params), params
-    score = Validation(validation)
+    score = functools.partial(validate, list(before_validation(validation)))
     history = [Progress(0, 0.0, float("nan"), score(params))]
     run = {"settings": repr(settings)}
     if state_file is not None and state_file.exists():
@@ -100,10 +102,10 @@ def train(
     top = max(history, key=lambda entry: (np.nan_to_num(entry.score), entry.step))
     step, losses, update = int(state.step), list[float](), _update()
     began = time.monotonic() - history[-1].seconds
-    with Batches(records, settings) as batches:
+    with contextlib.closing(batches(records, settings, step)) as coming:
         while (done := max((time.monotonic() - began) / seconds, step / steps)) < 1:
             rate = rate_at(step, done, settings)
-            state, value = update(state, batches(step), rate)
+            state, value = update(state, next(coming), rate)
             losses.append(float(value))
             step += 1
             over = time.monotonic() - began >= seconds or step >= steps
@@ -141,38 +143,27 @@ def _update() -> Callable[[Adam, Example, np.float32], tuple[Adam, jax.Array]]:
     return jax.jit(update)
 
 
-class Batches:
-    """Batches by the number of the step, each drawn while the one before is worked on."""
+def batches(
+    records: Sequence[np.ndarray], settings: Settings, step: int
+) -> Generator[Example, None, None]:
+    """The batches from a step on, on the devices, each drawn while the one before is worked on."""
+    devices = jax.local_devices()
+    if settings.batch % len(devices):
+        raise ValueError(
+            f"batch is {settings.batch}; it must be a multiple of the {len(devices)} devices"
+        )
+    sharding = NamedSharding(Mesh(np.array(devices), ("batch",)), PartitionSpec("batch"))
 
-    def __init__(self, records: Sequence[np.ndarray], settings: Settings) -> None:
-        self.records, self.settings = records, settings
-        devices = jax.local_devices()
-        if settings.batch % len(devices):
-            raise ValueError(
-                f"batch is {settings.batch}; it must be a multiple of the {len(devices)} devices"
-            )
-        mesh = Mesh(np.array(devices), ("batch",))
-        self.sharding = NamedSharding(mesh, PartitionSpec("batch"))
-        self.pool = ThreadPoolExecutor(1)
-        self.next: dict[int, Any] = {}
+    def drawn(step: int) -> Example:
+        random = np.random.default_rng([settings.seed, step])
+        chosen = random.choice(len(records), settings.batch)
+        return jax.tree.map(lambda *a: np.stack(a), *(draw(records[i], random) for i in chosen))
 
-    def __enter__(self) -> Batches:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.pool.shutdown(cancel_futures=True)
-
-    def __call__(self, step: int) -> Example:
-        """The examples of this step, on the devices."""
-        drawn = self.next.pop(step, None) or self.pool.submit(self._draw, step)
-        self.next[step + 1] = self.pool.submit(self._draw, step + 1)
-        return jax.device_put(drawn.result(), self.sharding)
-
-    def _draw(self, step: int) -> Example:
-        random = np.random.default_rng([self.settings.seed, step])
-        chosen = random.choice(len(self.records), self.settings.batch)
-        drawn = (draw(self.records[i], random) for i in chosen)
-        return jax.tree.map(lambda *a: np.stack(a), *drawn)
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(drawn, step)
+        for later in itertools.count(step + 1):
+            batch, coming = coming, pool.submit(drawn, later)
+            yield jax.device_put(batch.result(), sharding)
 
 
 class Shown(NamedTuple):
@@ -184,35 +175,27 @@ class Shown(NamedTuple):
     target: np.ndarray
 
 
-class Validation:
-    """Mean PSNR over frames with a reference, all before the network done once."""
-
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.frames = [shown for path in paths for shown in self._frames(path)]
-
-    def __call__(self, params: unet.Params) -> dict[str, float]:
-        """In dB by samples per pixel, by the protocol of DESIGN.md."""
-        found: dict[str, list[float]] = {}
-        for spp, read, factor, target in self.frames:
-            picture = factor * np.asarray(_corrected(params, read), np.float64)
-            psnr = metrics.psnr(metrics.display(picture, 1), target)
-            found.setdefault(str(spp), []).append(psnr)
-        return {spp: float(np.mean(values)) for spp, values in found.items()}
-
-    @staticmethod
-    def _frames(path: Path) -> list[Shown]:
+def before_validation(paths: Sequence[Path]) -> Iterator[Shown]:
+    """Frames with a reference, all before the network done once."""
+    for path in paths:
         frame, light = examples.layers(path)
         albedo = np.asarray(frame.albedo, np.float64)
         wanted = albedo * np.asarray(frame.reference)
         scale = metrics.exposure(wanted)
-        found = []
-        for spp in COUNTS:
-            if spp in light:
-                noisy = dataclasses.replace(frame, indirect=light[spp][0])
-                read, unit = before_network(noisy)
-                factor = albedo * (unit * scale)
-                found.append(Shown(spp, read, factor, metrics.display(wanted, scale)))
-        return found
+        for spp in (spp for spp in COUNTS if spp in light):
+            read, unit = before_network(dataclasses.replace(frame, indirect=light[spp][0]))
+            factor, target = albedo * (unit * scale), metrics.display(wanted, scale)
+            yield Shown(spp, read, factor, target)
+
+
+def validate(frames: Sequence[Shown], params: unet.Params) -> dict[str, float]:
+    """Mean PSNR in dB by samples per pixel, by the protocol of DESIGN.md."""
+    found: dict[str, list[float]] = {}
+    for spp, read, factor, target in frames:
+        picture = factor * np.asarray(_corrected(params, read), np.float64)
+        psnr = metrics.psnr(metrics.display(picture, 1), target)
+        found.setdefault(str(spp), []).append(psnr)
+    return {spp: float(np.mean(values)) for spp, values in found.items()}
 
 
 @jax.jit

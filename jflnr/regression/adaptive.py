@@ -61,7 +61,6 @@ class AdaptiveFLR:
     """
 
     name: ClassVar[str] = "flr-adaptive"
-    backends: ClassVar[tuple[str, ...]] = ("jax", "opencl")
     # Occlusion is averaged over 3 x 3 pixels.
     margin: ClassVar[int] = 1
     images: ClassVar[Any] = staticmethod(robust_images)

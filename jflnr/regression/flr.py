@@ -39,7 +39,6 @@ class FLR:
     """
 
     name: ClassVar[str] = "flr"
-    backends: ClassVar[tuple[str, ...]] = ("jax", "opencl")
     margin: ClassVar[int] = 0
     images: ClassVar[Any] = staticmethod(plain_images)
 
