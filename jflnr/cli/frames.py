@@ -220,7 +220,7 @@ class Worker:
         return dict(zip(names, given, strict=True))
 
     def _write(self, done: Denoised) -> Record:
-        """Write what is not there: the EXR, with the input's header and windows, and the preview."""
+        """Write what is not there: the EXR, with the input's header and window, the preview."""
         from jflnr import exr
         from jflnr.cli.preview import write_preview
         from jflnr.metrics import exposure

@@ -67,8 +67,8 @@ class Run(NamedTuple):
 
         With a define DOWN neighbouring work-items are below each other.
         """
-        width = self.context.width()
-        everywhere = {"Q": self.guides, "C": self.channels, "WIDTH": width, "REACH": REACH}
+        width = defines.setdefault("WIDTH", self.context.width())
+        everywhere = {"Q": self.guides, "C": self.channels, "REACH": REACH}
         everywhere |= brightness_defines(self.channels)
         h, pitch = grid.size
         size = (h, pitch // width) if defines.get("DOWN") else (pitch // width, h)

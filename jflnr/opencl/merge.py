@@ -12,7 +12,7 @@ def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
 
     Means are taken under the windows of the coarser level.
     """
-    options, windows = coarse.defines(), coarse.features.planes
+    options, windows = coarse.defines, coarse.features.planes
     signal = halve(run, _signal(run, fine, coarse, options))
     h, w, pitch = signal.sizes
     rows, share = run.grid(3, h, w), run.grid(1, h, w)

@@ -16,12 +16,13 @@ from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.moments import centre, collect, guide_defines, run_on_rows
 from jflnr.regression.adaptive import DEFAULT
 from jflnr.regression.moments import plane_count
-from jflnr.regression.window import REACH
 from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY, UNCOVERED
 
 NUMBERS = DEFAULT
 # Planes that are averaged over the windows, see change.cl.
 PLANES = 5
+FILE = "temporal/change.cl"
+NO_WINDOW = {"FEATURES": 0, "FEATURE_PLANES": 0}
 
 
 class Change(NamedTuple):
@@ -63,7 +64,7 @@ def find_change(
     grid, level = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
     fit = fit_level(run, grid, BLOCK)
     model, wrong, evidence = _judge(run, fit, level, evidence, caution)
-    _add_uncovered(run, known, covered, wrong)
+    _add_uncovered(run, known, covered, grid, wrong)
     signal, noise = context.empty(sample.shape), context.empty((*sample.shape[:2], 1))
     apply(context, model, guides, shift, BLOCK, grid.sizes, signal)
     apply(context, wrong, (), shift, BLOCK, grid.sizes, noise)
@@ -92,10 +93,8 @@ def _arrange(run: Run, moments: Any, w: int) -> tuple[Grid, Grid]:
     """The moments of the difference and its noise, and the brightness of the history."""
     h, from_pitch = moments.shape[1:]
     grid, level = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
-    defines = _defines(run) | {"WIDTH": 1}
-    pitch = grid.size[1]
-    arguments = h, w, pitch, from_pitch, moments, grid.planes, level.planes
-    run.context.run("arrange", "temporal/change.cl", defines, (pitch, h), arguments)
+    arguments = h, w, grid.size[1], from_pitch, moments, grid.planes, level.planes
+    run.launch("arrange", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)
     return grid, level
 
 
@@ -111,7 +110,7 @@ def _judge(
     features, moments, models = fit.features.planes, fit.moments.planes, fit.models.planes
 
     def launch(name: str, *arguments: Any) -> None:
-        run.launch(name, "temporal/change.cl", rows, (h, pitch, *arguments), **_defines(run))
+        run.launch(name, FILE, rows, (h, pitch, *arguments), **fit.defines)
 
     scale, sigma = run.numbers.guide_scale, run.numbers.sigma
     launch("measure", DIM, scale, moments, features, models, level.planes, planes.planes)
@@ -123,16 +122,7 @@ def _judge(
     return model, wrong, after.planes
 
 
-def _add_uncovered(run: Run, known: Any, covered: Any, wrong: Any) -> None:
+def _add_uncovered(run: Run, known: Any, covered: Any, grid: Grid, wrong: Any) -> None:
     """Adds what the history takes on around places that come into view to `wrong`."""
-    height, width = known.shape
-    h, pitch = wrong.shape[2:]
-    w = -(-width // BLOCK)
-    arguments = height, width, pitch, BLOCK, UNCOVERED, known, covered, wrong
-    defines = _defines(run) | {"WIDTH": 1}
-    run.context.run("add_uncovered", "temporal/change.cl", defines, (w, h), arguments)
-
-
-def _defines(run: Run) -> dict[str, Any]:
-    planes = {"FEATURES": run.guides, "FEATURE_PLANES": max(run.guides, 1)}
-    return {"Q": run.guides, "C": 3, "REACH": REACH, **planes, **brightness_defines(3)}
+    arguments = *known.shape, grid.size[1], BLOCK, UNCOVERED, known, covered, wrong
+    run.launch("add_uncovered", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)
