@@ -106,7 +106,7 @@ class FLNR(AdaptiveFLR):
                 reach=unet.reach_of(scales),
                 align=1 << scales,
                 totals=(("sums", 1),),
-                learn=learn_share,
+                learn=adaptive.learn_kept,
             ),
             Stage(restore, gives, ("image", "noise")),
         )
@@ -142,14 +142,6 @@ def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
     gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
     image = light * jnp.tile(gain, light.shape[2] // COLOURS)
     return {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
-
-
-def learn_share(method: FLNR, known: Known, sums: Parts) -> Known:
-    """What brings the brightness of the result near the input's."""
-    before, after = sums["sums"]
-    slack = 0 if method.keep_energy else method.slack
-    wanted = jnp.clip(after, (1 - slack) * before, (1 + slack) * before)
-    return {"share": jnp.where(after > 0, wanted / jnp.where(after > 0, after, 1), 1)}
 
 
 def restore(method: FLNR, parts: Parts, known: Known) -> Parts:

@@ -273,9 +273,12 @@ def before_and_after(image: jax.Array, parts: Parts, unit: jax.Array) -> jax.Arr
 
 
 def learn_kept(method: Any, known: Known, sums: Parts) -> Known:
-    """What brings the brightness of the result to the input's, over the pixels that count."""
+    """What brings the brightness of the result to the input's, or near it, over the pixels that
+    count."""
     before, after = sums["sums"]
-    return {"share": jnp.where(after > 0, before / jnp.where(after > 0, after, 1), 1)}
+    slack = 0 if method.keep_energy else method.slack
+    wanted = jnp.clip(after, (1 - slack) * before, (1 + slack) * before)
+    return {"share": jnp.where(after > 0, wanted / jnp.where(after > 0, after, 1), 1)}
 
 
 def keep_energy(method: Any, parts: Parts, known: Known) -> Parts:
