@@ -4,21 +4,11 @@ from .auto.method import select as select
 from .bmfr.pipeline import BMFR as BMFR
 from .denoising import Denoiser as Denoiser
 from .denoising import denoise as denoise
-from .frame import (
-    Frame as Frame,
-)
-from .frame import (
-    composite as composite,
-)
-from .frame import (
-    read_frame as read_frame,
-)
-from .frame import (
-    read_header as read_header,
-)
-from .frame import (
-    write_frame as write_frame,
-)
+from .frame import Frame as Frame
+from .frame import composite as composite
+from .frame import read_frame as read_frame
+from .frame import read_header as read_header
+from .frame import write_frame as write_frame
 from .methods import BACKENDS as BACKENDS
 from .methods import METHODS as METHODS
 from .network.flnr import FLNR as FLNR
