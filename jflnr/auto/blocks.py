@@ -21,12 +21,11 @@ from jflnr.auto.nested import fit_orders
 from jflnr.auto.weights import SETTINGS, weigh, weighted
 from jflnr.regression.adaptive import mean_light
 from jflnr.regression.energy import restore
-from jflnr.regression.level import Fit, Grid, mean_guides, predict, windowed
+from jflnr.regression.level import Fit, Grid, guide_features, mean_guides, predict, windowed
 from jflnr.regression.moments import index_xx, index_xy
+from jflnr.regression.multiscale import refine as refine_grid
 from jflnr.regression.pyramid import double, halve
 from jflnr.regression.uncertainty import DETAIL, Error
-from jflnr.regression.widths import Known, guide_features
-from jflnr.regression.widths import refine as refine_grid
 from jflnr.regression.window import gather, window_over
 
 # Side in pixels of the coarsest blocks.
@@ -177,11 +176,11 @@ def _refined(
     order, width = (double(planes, *size) for planes in (last.order, last.width))
     found = [order]
 
-    def own_fit(known: Known) -> Fit:
+    def own_fit(grid: Grid, features: jax.Array, coarse: Fit) -> Fit:
         if shifted:
-            return _shift_grid(grid, known, collected)
+            return _shift_grid(grid, features, coarse, collected)
         slopes = grid.block >= SLOPES
-        fine, found[0] = _fit_grid(grid, known.features, collected, groups, mean, slopes)
+        fine, found[0] = _fit_grid(grid, features, collected, groups, mean, slopes)
         return fine
 
     step = refine_grid(grid, last.fit, last.merged, count, mean, SETTINGS, own_fit)
@@ -197,17 +196,13 @@ def _refined(
     )
 
 
-def _shift_grid(
-    grid: Grid,
-    known: Known,
-    collected: Collected,
-) -> Fit:
+def _shift_grid(grid: Grid, features: jax.Array, coarse: Fit, collected: Collected) -> Fit:
     """The models of a coarser grid, each shifted by the mean of what it leaves under the window.
 
     Sums of a few planes instead of moments and a solve.
     """
     count, channels = collected.shift.size, collected.channels
-    window, coarse = window_over(known.features, SETTINGS.sigma), known.coarse
+    window = window_over(features, SETTINGS.sigma)
     sums = grid.moments[np.array([index_xx(i, 0) for i in range(count + 1)])]
     light = grid.moments[index_xy(0, 0, count, channels) :][:channels]
     left = light - jnp.einsum("qchw,qhw->chw", coarse.coefficients, sums)

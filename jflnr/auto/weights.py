@@ -10,10 +10,9 @@ import numpy as np
 
 from jflnr.auto.collected import Collected
 from jflnr.regression.adaptive import DEFAULT
-from jflnr.regression.level import Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.level import Grid, fit_level, mean_guides, predict
 from jflnr.regression.moments import index_xx
 from jflnr.regression.pyramid import double, halve
-from jflnr.regression.widths import guide_features
 
 # Chosen on train and val. Blocks differ less from their pixels than pixels do, so weights may fall
 # more steeply with brightness than in adaptive FLR.
@@ -51,9 +50,7 @@ def _first_fit(light: jax.Array, shift: jax.Array, mean: jax.Array, block: int) 
         light, block = halve(light), 2 * block
         sizes.append(light.shape[1:])
     grid = Grid(light, jnp.zeros_like(light[:1]), block)
-    features = guide_features(grid, shift.size, SETTINGS)
-    models = fit_level(windowed(grid, features, shift, 1, mean, SETTINGS), shift.size, 1)
-    coefficients = models.coefficients
+    coefficients = fit_level(grid, shift, 1, mean, SETTINGS).coefficients
     for size in reversed(sizes[:-1]):
         coefficients = double(coefficients, *size)
     return coefficients

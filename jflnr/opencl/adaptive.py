@@ -33,7 +33,7 @@ from jflnr.regression.arguments import channel_count, check_regression
 
 
 class Step(NamedTuple):
-    """One level finer than what was known before; see `jflnr.regression.widths.Step`.
+    """One level finer than what was known before; see `jflnr.regression.multiscale.Step`.
 
     fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
     coarser grid.

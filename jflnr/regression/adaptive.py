@@ -20,7 +20,7 @@ from jflnr.regression import energy
 from jflnr.regression.apply import apply
 from jflnr.regression.arguments import channel_count, check_options, check_regression
 from jflnr.regression.floor import with_own_light
-from jflnr.regression.level import Grid, brightness, fit_level, mean_guides, windowed
+from jflnr.regression.level import Grid, brightness, fit_level, mean_guides
 from jflnr.regression.moments import (
     Guides,
     centre,
@@ -31,9 +31,9 @@ from jflnr.regression.moments import (
     magnitude,
     planes,
 )
+from jflnr.regression.multiscale import fit_levels, merged_models
 from jflnr.regression.pyramid import halve
 from jflnr.regression.uncertainty import DETAIL, block_error
-from jflnr.regression.widths import fit_levels, guide_features, merged_models
 from jflnr.regression.window import REACH
 from jflnr.stages import Known, Parts, Stage, regress
 
@@ -206,11 +206,9 @@ def mean_light(count: jax.Array, light: jax.Array) -> jax.Array:
 
 def fit_pilot(method: Any, parts: Parts, known: Known) -> Parts:
     """Models of the brightness from the moments of pass 1, `(Q + 1, 1, h, w)`."""
-    light, shift = halve(parts["light"]), known["shift"]
+    light = halve(parts["light"])
     grid = Grid(light, jnp.zeros_like(light[:1]), 4 * method.finest)
-    features = guide_features(grid, shift.size, method)
-    system = windowed(grid, features, shift, 1, known["mean"], method)
-    return {"pilot": fit_level(system, shift.size, 1).coefficients}
+    return {"pilot": fit_level(grid, known["shift"], 1, known["mean"], method).coefficients}
 
 
 def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:

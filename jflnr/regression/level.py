@@ -90,11 +90,29 @@ class Windowed(NamedTuple):
     window: Window
 
 
-def fit_level(system: Windowed, guides: int, channels: int) -> Fit:
-    """The models of one level, of the guides alone, from `windowed`."""
+def guide_features(grid: Grid, guides: int, numbers: AdaptiveFLR) -> jax.Array:
+    """What of the guides must be alike inside a window, `(Q, h, w)`."""
+    return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
+
+
+def fit_level(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveFLR,
+    features: jax.Array | None = None,
+    *,
+    slopes: bool = True,
+) -> Fit:
+    """The models of one level, of the guides alone. features: of the guides alone if None; the
+    rest as of `windowed`."""
+    if features is None:
+        features = guide_features(grid, shift.size, numbers)
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
     regular = system.eps, system.eps_prime
     coefficients = solve_strips(system.moments, system.shift, *regular, channels)
-    return Fit(coefficients[: guides + 1], system.variance, system.window)
+    return Fit(coefficients[: shift.size + 1], system.variance, system.window)
 
 
 def windowed(

@@ -12,11 +12,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, light_of
+from jflnr.regression.adaptive import DEFAULT, light_of
 from jflnr.regression.apply import apply
-from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict
 from jflnr.regression.moments import Guides, centre, collect, collect_weighted
-from jflnr.regression.widths import guide_features
 from jflnr.regression.window import gather
 
 # Side of the blocks in pixels. Windows have a standard deviation of two of them: from one sample
@@ -84,7 +83,8 @@ def find_change(
     squares = jnp.where(weight > 0, weight * light, 0) ** 2
     grid = Grid(*collect_weighted(difference, guides, shift, weight, squares, BLOCK), BLOCK)
     count, total = collect(expected[..., None], (), shift[:0], BLOCK, weight)
-    fit = _fit(grid, shift, difference.shape[-1], numbers)
+    # Its variance is told by its residuals, which without a change are the differences themselves.
+    fit = fit_level(grid, shift, difference.shape[-1], jnp.ones(()), numbers)
     found = predict(fit.coefficients, mean_guides(grid.moments, shift.size))
     level = total / jnp.maximum(count, 1e-12)
     share, noise, evidence = _judge(fit, found, level, grid.moments[0] > 1e-12, evidence, caution)
@@ -108,14 +108,6 @@ def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:
     """Over the pixels that count; 1 where there is no light."""
     mean = jnp.sum(brightness * weight) / jnp.maximum(jnp.sum(weight), 1e-12)
     return jnp.where(mean > 0, mean, 1)
-
-
-def _fit(grid: Grid, shift: jax.Array, channels: int, numbers: AdaptiveFLR) -> Fit:
-    """Its variance is told by its residuals (as in `level.py`), which without a change are the
-    differences themselves."""
-    features = guide_features(grid, shift.size, numbers)
-    system = windowed(grid, features, shift, channels, jnp.ones(()), numbers)
-    return fit_level(system, shift.size, channels)
 
 
 def _judge(
