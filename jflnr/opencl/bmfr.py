@@ -89,9 +89,9 @@ def accumulate_light(
     accepted = context.empty((height, width), np.uint8)
     before = history.surface
     arguments = (
-        OFF_PLANE, SAME_NORMAL, method.light_share, layers["sample"], layers["surface"],
-        layers["motion"], layers["normal"], layers["depth"], layers["position"], before.normal,
-        before.depth, before.position, history.samples, history.light, light, count, accepted,
+        OFF_PLANE, SAME_NORMAL, layers["motion"], layers["normal"], layers["depth"],
+        layers["position"], before.normal, before.depth, before.position, method.light_share,
+        layers["sample"], layers["surface"], history.samples, history.light, light, count, accepted,
     )  # fmt: skip
     defines = {"MOST": pipeline.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
     run(context, "accumulate_light", layers, arguments, defines)

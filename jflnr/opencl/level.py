@@ -27,12 +27,7 @@ class Level(NamedTuple):
 
 
 def fit_level(
-    run: Run,
-    moments: Grid,
-    side: int,
-    found: Grid | None = None,
-    *,
-    slopes: bool = True,
+    run: Run, moments: Grid, side: int, found: Grid | None = None, *, slopes: bool = True
 ) -> Level:
     """Fit the models of one level.
 

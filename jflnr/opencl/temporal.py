@@ -21,7 +21,7 @@ from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import State, Temporal, prepared
+from jflnr.temporal.sequence import PAST, State, Temporal, prepared
 
 
 def start(frame: Frame, context: Context | None = None) -> State:
@@ -39,10 +39,10 @@ def step(
     frame: Frame,
     method: Any = None,
     *,
-    guides: Sequence[str] | None = None,
-    temporal: Temporal | None = None,
     context: Context | None = None,
     on_device: bool = False,
+    guides: Sequence[str] | None = None,
+    temporal: Temporal = PAST,
     **options: Any,
 ) -> tuple[State, Any]:
     """`jflnr.temporal.step` on an OpenCL device: same arguments, same result.
@@ -55,7 +55,6 @@ def step(
     """
     context = default_context() if context is None else context
     method, names, inputs = prepared(state, frame, method, guides, options)
-    temporal = temporal or Temporal()
     smooth = functools.partial(smooth_guide, context=context)
     given = method.images(inputs, names, smooth=smooth)
     layers = to_layers(context, given["guides"])
@@ -100,8 +99,8 @@ def reproject(
     # Surfaces without a position are told apart by depth; what stands in its place is not used.
     places = [s.normal if depths else s.position for s in (surface, before)]
     arguments = (
-        width, height, OFF_PLANE, SAME_NORMAL, covered, motion, surface.normal, surface.depth,
-        places[0], before.normal, before.depth, places[1], *state.light, *state.image, *light,
+        width, height, OFF_PLANE, SAME_NORMAL, motion, surface.normal, surface.depth, places[0],
+        before.normal, before.depth, places[1], covered, *state.light, *state.image, *light,
         *image, expected, known,
     )  # fmt: skip
     defines = guide_defines((), 3) | brightness_defines(3) | ({"DEPTHS": 1} if depths else {})

@@ -13,20 +13,15 @@
 // and accepted (H, W). surface: above 0 where samples count. before_...: of the previous frame; where
 // its count is 0 nothing is taken from it. accepted: bit i for tap i, for phase III.
 kernel void accumulate_light(
-    int width, int height, float off_plane, float same_normal, float least,
-    global const float *sample, global const float *surface, global const float *motion,
-    global const float *normal, global const float *depth, global const float *position,
-    global const float *before_normal, global const float *before_depth,
-    global const float *before_position, global const float *before_count,
+    int width, int height, SURFACE_PARAMETERS, float least, global const float *sample,
+    global const float *surface, global const float *before_count,
     global const float *before_light, global float *light, global float *count,
     global uchar *accepted)
 {
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
     const long pixel = (long)y * width + x;
-    Taps taps = surface_taps(
-        OWN(motion, 2, 0), OWN(motion, 2, 1), x, y, width, height, off_plane, same_normal,
-        surface_here(normal, depth, position, pixel), before_normal, before_depth, before_position);
+    Taps taps = surface_taps(x, y, width, height, SURFACES);
     mask accepts = 0;
     real samples = 0;
 #pragma unroll
