@@ -39,10 +39,10 @@ def step(
     frame: Frame,
     method: Any = None,
     *,
+    temporal: Temporal = PAST,
     context: Context | None = None,
     on_device: bool = False,
     guides: Sequence[str] | None = None,
-    temporal: Temporal = PAST,
     **options: Any,
 ) -> tuple[State, Any]:
     """`jflnr.temporal.step` on an OpenCL device: same arguments, same result.
