@@ -185,43 +185,36 @@ def plan(
     ms = None
     if limits.seconds is not None:
         ms = {form: 1e3 * limits.seconds * pixels * c for form, c in cost.items()}
-    form = choose(_open(first, decibels, limits), cost, ms, limits.budget_ms, limits.target_db)
+    form = choose(first, decibels, cost, ms, limits)
     time = None if ms is None else ms[form]
     return Plan(form, names, decibels, cost, time, order, COLLECTED[first], len(names))
 
 
-def _open(first: str, decibels: Mapping[str, float], limits: Limits) -> dict[str, float]:
-    """The forms that may be taken. With no other wish than the smallest model that is enough, a
-    simple frame stays with the form for such, and none goes on to the network: which frames gain by
-    it cannot be predicted (docs/select.md)."""
-    if limits.target_db is not None or limits.budget_ms is not None:
-        return dict(decibels)
-    small = BLOCKS[:1] if first == FORMS[0] else BLOCKS[1:]
-    return {form: value for form, value in decibels.items() if form in small}
-
-
 def choose(
+    first: str,
     decibels: Mapping[str, float],
     cost: Mapping[str, float],
     milliseconds: Mapping[str, float] | None,
-    budget_ms: float | None,
-    target_db: float | None,
+    limits: Limits,
 ) -> str:
     """The form to take, out of those in `decibels`, from the cheapest to the dearest.
 
     With a target the cheapest form that is expected to reach it, or else the best. With a budget
     none that is expected to take longer, unless all do: then the cheapest. With neither, the one
-    whose last decibel is worth its time (PRICE).
+    whose last decibel is worth its time (PRICE): a simple frame stays with the form for such, which
+    has looked first, and none goes on to the network, as which frames gain by it cannot be
+    predicted (docs/select.md).
     """
     forms = list(decibels)
-    if budget_ms is not None and milliseconds is not None:
-        forms = [form for form in forms if milliseconds[form] <= budget_ms] or forms[:1]
+    if limits.budget_ms is not None and milliseconds is not None:
+        forms = [form for form in forms if milliseconds[form] <= limits.budget_ms] or forms[:1]
     best = max(forms, key=lambda form: decibels[form])
-    if target_db is not None:
-        return next((form for form in forms if decibels[form] >= target_db), best)
-    if budget_ms is not None:
+    if limits.target_db is not None:
+        return next((form for form in forms if decibels[form] >= limits.target_db), best)
+    if limits.budget_ms is not None:
         return best
-    return max(forms, key=lambda form: decibels[form] - PRICE * cost[form])
+    small = BLOCKS[:1] if first == BLOCKS[0] else BLOCKS[1:]
+    return max(small, key=lambda form: decibels[form] - PRICE * cost[form])
 
 
 @functools.cache
