@@ -118,10 +118,7 @@ def refine(
 
 
 def _models(
-    progress: Progress,
-    light: jax.Array,
-    collected: Collected,
-    groups: tuple[int, ...],
+    progress: Progress, light: jax.Array, collected: Collected, groups: tuple[int, ...]
 ) -> Models:
     """What the progress has come to. light: moments of the brightness, on twice larger blocks."""
     count = collected.shift.size
@@ -143,12 +140,7 @@ def _models(
     )
 
 
-def _widest(
-    grid: Grid,
-    collected: Collected,
-    groups: tuple[int, ...],
-    mean: jax.Array,
-) -> Progress:
+def _widest(grid: Grid, collected: Collected, groups: tuple[int, ...], mean: jax.Array) -> Progress:
     """The models of the coarsest grid."""
     count = collected.shift.size
     features = guide_features(grid, count, SETTINGS)

@@ -157,12 +157,7 @@ def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Grid:
     return fit_level(run, halve_planes(run, moments, w), 4 * block).models
 
 
-def fit_levels(
-    run: Run,
-    moments: Grid,
-    block: int,
-    levels: int,
-) -> tuple[list[Step], Grid]:
+def fit_levels(run: Run, moments: Grid, block: int, levels: int) -> tuple[list[Step], Grid]:
     """The steps from the coarsest grid to the finest, and the models put together from all levels.
 
     block: side of the finest blocks.

@@ -73,11 +73,7 @@ def to_device(context: Context, layer: Any) -> Any:
 
 
 def accumulate_light(
-    context: Context,
-    history: History,
-    layers: dict[str, Any],
-    method: BMFR,
-    depths: bool,
+    context: Context, history: History, layers: dict[str, Any], method: BMFR, depths: bool
 ) -> tuple[Any, Any, Any]:
     """Phase I: mean of the samples at each place; see `jflnr.bmfr.pipeline.accumulate_light`.
 

@@ -41,12 +41,7 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
 
 
 def rescale(
-    context: Context,
-    image: Any,
-    target: Any,
-    weight: Any | None,
-    output: Any,
-    slack: float = 0.0,
+    context: Context, image: Any, target: Any, weight: Any | None, output: Any, slack: float = 0.0
 ) -> None:
     """Scale the result so that its brightness sums to the input's over the pixels that count.
 

@@ -26,11 +26,7 @@ def guide_arguments(guides: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def run_on_rows(
-    context: Context,
-    name: str,
-    file: str,
-    defines: dict[str, Any],
-    arguments: tuple[Any, ...],
+    context: Context, name: str, file: str, defines: dict[str, Any], arguments: tuple[Any, ...]
 ) -> None:
     """Enqueue a kernel over vectors of neighbours in a row, which may overlap.
 

@@ -109,12 +109,7 @@ def reproject(
 
 
 def accumulate(
-    context: Context,
-    before: Average,
-    change: Change,
-    image: Any,
-    covered: Any,
-    least: float,
+    context: Context, before: Average, change: Change, image: Any, covered: Any, least: float
 ) -> tuple[Average, Any]:
     """An average that follows the change, with `image` in it; its samples times `covered`, which
     says how much a pixel counts, `(H, W)`.

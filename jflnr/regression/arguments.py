@@ -28,12 +28,7 @@ def check_options(method: Any) -> None:
                 raise ValueError(f"{option.name} is {value}; it must be a positive number")
 
 
-def check_regression(
-    target: Any,
-    guides: Any,
-    guides_map: Any | None,
-    weight: Any | None,
-) -> int:
+def check_regression(target: Any, guides: Any, guides_map: Any | None, weight: Any | None) -> int:
     """Raise on wrong arguments of `flr`; return how many times finer `guides_map` is."""
     checks.image("target", target)
     if target.shape[2] == 0:

@@ -36,12 +36,7 @@ def merged_models(coarsest: Fit, steps: list[Step]) -> jax.Array:
 
 
 def fit_levels(
-    grid: Grid,
-    shift: jax.Array,
-    channels: int,
-    levels: int,
-    mean: jax.Array,
-    numbers: AdaptiveFLR,
+    grid: Grid, shift: jax.Array, channels: int, levels: int, mean: jax.Array, numbers: AdaptiveFLR
 ) -> tuple[Fit, list[Step]]:
     """The fit of the coarsest grid, and the steps from there to the finest."""
     grids = grid.pyramid(levels)

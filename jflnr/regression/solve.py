@@ -84,11 +84,7 @@ def normal_equations(
 
 
 def solve(
-    moments: jax.Array,
-    shift: jax.Array,
-    method: Any,
-    channels: int,
-    solver: Solver = "cholesky",
+    moments: jax.Array, shift: jax.Array, method: Any, channels: int, solver: Solver = "cholesky"
 ) -> jax.Array:
     """Coefficients of the local affine models, one per block (Appendix, Eq. 12-23).
 
