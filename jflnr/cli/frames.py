@@ -203,7 +203,7 @@ class Worker:
             rows = profile(default_context(), lambda: denoise_frame(frame))
             record["profile"] = [row._asdict() for row in rows]
         if arguments.explain:
-            from jflnr.cli.explain import explain
+            from jflnr.cli.pictures import explain
 
             record["plan"] = explain(job.explanation, frame, self.settings["guides"])
         if arguments.reference:
@@ -222,7 +222,7 @@ class Worker:
     def _write(self, done: Denoised) -> Record:
         """Write what is not there: the EXR, with the input's header and window, the preview."""
         from jflnr import exr
-        from jflnr.cli.preview import write_preview
+        from jflnr.cli.pictures import write_preview
         from jflnr.metrics import exposure
 
         start, arguments = time.perf_counter(), self.arguments
@@ -234,10 +234,8 @@ class Worker:
             window, others = source.attributes.window, source.attributes.others
             exr.write_channels(job.target, channels, comments, window, others)
         if arguments.png and missing(job.preview):
-            # The sky or a lamp in view would darken the room: the brightness is set on reflected
-            # light.
-            scale = exposure(np.nan_to_num(result.lit))
-            write_preview(job.preview, result.picture, scale)
+            # The sky or a lamp in view would darken the room, so what is lit sets the brightness.
+            write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))
         self.exr_seconds["write"] += time.perf_counter() - start
         return _record(job) | {"status": "written"} | record
 
