@@ -24,7 +24,7 @@ from jflnr.regression.energy import restore
 from jflnr.regression.level import Fit, Grid, guide_features, mean_guides, predict, windowed
 from jflnr.regression.moments import index_xx, index_xy
 from jflnr.regression.multiscale import refine as refine_grid
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.resampling import double, halve
 from jflnr.regression.uncertainty import DETAIL, Error
 from jflnr.regression.window import gather, window_over
 
@@ -43,7 +43,7 @@ class Models(NamedTuple):
 
     coefficients: `(Q + 1, C, h, w)`. means: `(Q + 1, h, w)`, of each block's guides. usable:
     `(h, w)`, how much of each block can be used. order: `(h, w)`, how many groups of guides they
-    use. width: `(h, w)`, how often the coarsest blocks were halved. level, error: `(h, w)`, the
+    use. width: `(h, w)`, how often the coarsest blocks were halved. luminance, error: `(h, w)`, the
     brightness and its expected squared error. share: `(h, w)`, how much of the last halving is
     signal. gains: `(G,)`, mean square of what each group of guides does inside blocks. mean: of the
     brightness. All in the unit of `Collected`.
@@ -54,7 +54,7 @@ class Models(NamedTuple):
     usable: jax.Array
     order: jax.Array
     width: jax.Array
-    level: jax.Array
+    luminance: jax.Array
     error: jax.Array
     share: jax.Array
     gains: jax.Array
@@ -73,7 +73,7 @@ class Progress(NamedTuple):
     merged: jax.Array
     order: jax.Array
     width: jax.Array
-    level: jax.Array
+    luminance: jax.Array
     error: Error
     share: jax.Array
 
@@ -125,14 +125,16 @@ def _models(
     coefficients = restore(progress.merged, light, count, SETTINGS.slack)
     moments = collected.moments[: index_xy(0, 0, count, 0)]
     done = inside(coefficients, moments, groups)
-    error = progress.error.square() + DETAIL * progress.level**2 + INSIDE * jnp.sum(done, axis=0)
+    error = (
+        progress.error.square() + DETAIL * progress.luminance**2 + INSIDE * jnp.sum(done, axis=0)
+    )
     return Models(
         coefficients=coefficients,
         means=mean_guides(moments, count),
         usable=moments[0],
         order=progress.order,
         width=progress.width,
-        level=progress.level,
+        luminance=progress.luminance,
         error=error,
         share=progress.share,
         gains=jnp.sum(moments[0] * done, axis=(1, 2)) / jnp.maximum(jnp.sum(moments[0]), 1e-12),
@@ -145,10 +147,10 @@ def _widest(grid: Grid, collected: Collected, groups: tuple[int, ...], mean: jax
     count = collected.shift.size
     features = guide_features(grid, count, SETTINGS)
     fit, order = _fit_grid(grid, features, collected, groups, mean)
-    level = predict(fit.coefficients, mean_guides(grid.moments, count))
+    luminance = predict(fit.coefficients, mean_guides(grid.moments, count))
     zero, one = jnp.zeros_like(order), jnp.ones_like(order)
     merged = fit.coefficients
-    return Progress(mean, fit, merged, order, zero, level, Error.of(fit), one)
+    return Progress(mean, fit, merged, order, zero, luminance, Error.of(fit), one)
 
 
 def _refined(
@@ -182,7 +184,7 @@ def _refined(
         merged=step.merged,
         order=order + step.share * (found[0] - order),
         width=width + step.share * (number - width),
-        level=step.level,
+        luminance=step.luminance,
         error=last.error.after(step),
         share=step.share,
     )

@@ -18,7 +18,7 @@ from jflnr.regression.moments import (
     collect,
     index_xx,
     index_xy,
-    magnitude,
+    unit_of,
 )
 
 
@@ -58,7 +58,7 @@ def collect_frame(
     """
     check_regression(target, guides, None, weight)
     shift = centre(guides)
-    unit = magnitude(target)
+    unit = unit_of(target)
     channels = target.shape[-1]
     weights = brightness(channels, unit.dtype) / unit
     planes = collect(target, guides, shift, block, weight, weights)

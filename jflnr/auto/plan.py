@@ -114,18 +114,18 @@ class Plan:
 
 def look_at(models: Models) -> Look:
     """Numbers of one frame from the models of its blocks."""
-    level, error, share, order, width = (
+    luminance, error, share, order, width = (
         np.asarray(planes, np.float64)
-        for planes in (models.level, models.error, models.share, models.order, models.width)
+        for planes in (models.luminance, models.error, models.share, models.order, models.width)
     )
     used = np.asarray(models.usable) > 0
     used = used if used.any() else np.ones_like(used)
     mean = float(models.mean)
     scale = MEAN_BRIGHTNESS / mean
-    shown = np.clip(scale * level, 1e-2, 1)
-    slope = np.where(scale * level < 1, scale / GAMMA * shown ** (1 / GAMMA - 1), 0)
+    shown = np.clip(scale * luminance, 1e-2, 1)
+    slope = np.where(scale * luminance < 1, scale / GAMMA * shown ** (1 / GAMMA - 1), 0)
     displayed = max(float(np.mean((error * slope**2)[used])), 1e-9)
-    relative = error / (level**2 + 0.01 * mean**2)
+    relative = error / (luminance**2 + 0.01 * mean**2)
     return Look(
         decibels=-10 * float(np.log10(displayed)),
         share=float(np.mean(share[used])),

@@ -12,7 +12,7 @@ from jflnr.auto.collected import Collected
 from jflnr.regression.adaptive import DEFAULT
 from jflnr.regression.level import Grid, fit_level, mean_guides, predict
 from jflnr.regression.moments import index_xx
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.resampling import double, halve
 
 # Chosen on train and val. Blocks differ less from their pixels than pixels do, so weights may fall
 # more steeply with brightness than in adaptive FLR.
@@ -31,10 +31,10 @@ def weigh(
     """
     count = collected.shift.size
     pilot = _first_fit(light, collected.shift, mean, block)
-    level = predict(pilot, mean_guides(light, count))
+    luminance = predict(pilot, mean_guides(light, count))
     squares = squared_residual(light, collected.squares, pilot[:, 0])
-    # The floor is there for the derivative of the power at 0.
-    relative = jnp.maximum(level / mean, 1e-6)
+    # The bound is there for the derivative of the power at 0.
+    relative = jnp.maximum(luminance / mean, 1e-6)
     return 1 / (relative**SETTINGS.exponent + SETTINGS.offset), squares[None]
 
 

@@ -25,7 +25,7 @@ from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
-from jflnr.opencl.pyramid import halve, halve_planes
+from jflnr.opencl.resampling import halve, halve_planes
 from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR

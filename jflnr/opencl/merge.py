@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import Level, new_models
-from jflnr.opencl.pyramid import halve
+from jflnr.opencl.resampling import halve
 
 
 def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:

@@ -61,9 +61,9 @@ def find_change(
     moments = collect(context, target, guides, shift, BLOCK, weight)
     count = sum(layer.shape[2] for layer in guides)
     run = Run(context, count, 3, NUMBERS, shift, mean)
-    grid, level = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
+    grid, luminance = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
     fit = fit_level(run, grid, BLOCK)
-    model, wrong, evidence = _judge(run, fit, level, evidence, caution)
+    model, wrong, evidence = _judge(run, fit, luminance, evidence, caution)
     _add_uncovered(run, known, covered, grid, wrong)
     signal, noise = context.empty(sample.shape), context.empty((*sample.shape[:2], 1))
     apply(context, model, guides, shift, BLOCK, grid.sizes, signal)
@@ -92,14 +92,14 @@ def _difference(
 def _arrange(run: Run, moments: Any, w: int) -> tuple[Grid, Grid]:
     """The moments of the difference and its noise, and the brightness of the history."""
     h, from_pitch = moments.shape[1:]
-    grid, level = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
-    arguments = h, w, grid.size[1], from_pitch, moments, grid.planes, level.planes
+    grid, luminance = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
+    arguments = h, w, grid.size[1], from_pitch, moments, grid.planes, luminance.planes
     run.launch("arrange", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)
-    return grid, level
+    return grid, luminance
 
 
 def _judge(
-    run: Run, fit: Level, level: Grid, evidence: Any, caution: float
+    run: Run, fit: Level, luminance: Grid, evidence: Any, caution: float
 ) -> tuple[Any, Any, Any]:
     """The models of what is signal, `(Q + 1, 3, h, pitch)`, the noise that the history takes on,
     `(1, 1, h, pitch)`, and the evidence for the next frame."""
@@ -113,7 +113,7 @@ def _judge(
         run.launch(name, FILE, rows, (h, pitch, *arguments), **fit.defines)
 
     scale, sigma = run.numbers.guide_scale, run.numbers.sigma
-    launch("measure", DIM, scale, moments, features, models, level.planes, planes.planes)
+    launch("measure", DIM, scale, moments, features, models, luminance.planes, planes.planes)
     launch("change_rows", sigma, features, planes.planes, rows.planes)
     launch(
         "judge", sigma, caution, NEWEST, FOLLOWED, NOVELTY, features, moments, rows.planes, models,

@@ -28,11 +28,11 @@ from jflnr.regression.moments import (
     collect,
     collect_weighted,
     index_xy,
-    magnitude,
     planes,
+    unit_of,
 )
 from jflnr.regression.multiscale import fit_levels, merged_models
-from jflnr.regression.pyramid import halve
+from jflnr.regression.resampling import halve
 from jflnr.regression.uncertainty import DETAIL, block_error
 from jflnr.regression.window import REACH
 from jflnr.stages import Known, Parts, Stage, regress
@@ -105,7 +105,7 @@ class AdaptiveFLR:
 
     def known(self, images: Parts) -> Known:
         """What guides are measured from, and what the light is divided by."""
-        return {"shift": centre(images["guides"]), "unit": magnitude(images["target"])}
+        return {"shift": centre(images["guides"]), "unit": unit_of(images["target"])}
 
     def stages(self) -> tuple[Stage, ...]:
         side = self.finest
@@ -254,7 +254,7 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
         given["sums"] = before_and_after(image, parts, unit)
     if method.tells_error:
         own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
-        # The floor is there for its root's derivative, and for pixels that see no light.
+        # The bound is there for its root's derivative, and for pixels that see no light.
         error = jnp.sqrt(parts["error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
         none = jnp.zeros((*parts["target"].shape[:2], 0), error.dtype)
         given["error"] = apply(error[None, None], none, shift[:0], method.finest) * unit
@@ -307,7 +307,7 @@ def _weights(
     light, expected: `(H, W)`.
     Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
     """
-    # The floor is there for the logarithm; written so, the power takes a quarter of the time.
+    # The bound is there for the logarithm; written so, the power takes a quarter of the time.
     relative = jnp.log(jnp.maximum(expected / mean, 1e-6))
     weights = 1 / (jnp.exp(numbers.exponent * relative) + numbers.offset)
     usable = jnp.isfinite(light)

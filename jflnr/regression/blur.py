@@ -11,7 +11,7 @@ def gaussian_taps(sigma: jax.Array | float, reach: int, dtype: jnp.dtype) -> jax
     sigma: standard deviation, in steps of the grid. Returns `(2 reach + 1,)`.
     """
     offsets = jnp.arange(-reach, reach + 1, dtype=dtype)
-    # The floor keeps a width of zero the identity instead of 0/0.
+    # The bound keeps a width of zero the identity instead of 0/0.
     variance = jnp.maximum(jnp.asarray(sigma, dtype), 1e-2) ** 2
     taps = jnp.exp(-0.5 * offsets**2 / variance)
     return taps / jnp.sum(taps)

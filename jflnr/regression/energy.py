@@ -6,7 +6,7 @@ from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.level import brightness, mean_guides, predict
 from jflnr.regression.moments import index_xy
-from jflnr.regression.pyramid import halve
+from jflnr.regression.resampling import halve
 
 
 def restore(

@@ -9,7 +9,7 @@ import numpy as np
 from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.moments import index_xx, index_xy
-from jflnr.regression.pyramid import halve
+from jflnr.regression.resampling import halve
 from jflnr.regression.solve import solve_strips
 from jflnr.regression.window import Window, gather, gather_moments, window_over
 
@@ -146,8 +146,8 @@ def windowed(
     variance = gather(grid.noise, window.squared())[0] * inverse * inverse
     start = index_xy(0, 0, guides + positions, channels)
     colour = moments[start : start + channels] / n
-    level = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
-    relative = variance / (jnp.maximum(level, 0) ** 2 + 0.01 * mean**2)
+    luminance = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
+    relative = variance / (jnp.maximum(luminance, 0) ** 2 + 0.01 * mean**2)
     ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
 
     # Positions are centred on the window already, so only their own ridge is added.

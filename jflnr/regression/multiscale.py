@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
 from jflnr.regression.merge import interpolate, signal_share
-from jflnr.regression.pyramid import double
+from jflnr.regression.resampling import double
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Step(NamedTuple):
     """One level finer than what was known before.
 
-    fine: its fit. coarse: that of the coarser level, on this grid. level: `(h, w)`, brightness
+    fine: its fit. coarse: that of the coarser level, on this grid. luminance: `(h, w)`, brightness
     known before. share: `(h, w)`, how much of their difference is signal. merged: models
     `(Q + 1, C, h, w)` with that share added.
     """
@@ -25,7 +25,7 @@ class Step(NamedTuple):
     grid: Grid
     fine: Fit
     coarse: Fit
-    level: jax.Array
+    luminance: jax.Array
     share: jax.Array
     merged: jax.Array
 
@@ -71,12 +71,12 @@ def refine(
     """
     size, window = grid.moments.shape[1:], coarse.window
     coarse, merged = interpolate(coarse, *size), double(merged, *size)
-    level = jnp.maximum(predict(merged, mean_guides(grid.moments, guides)), 0)
+    luminance = jnp.maximum(predict(merged, mean_guides(grid.moments, guides)), 0)
     # Windows end where what is known so far of the brightness changes.
-    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
+    edge = numbers.brightness_scale * jnp.log(luminance / mean + 0.1)
     features = jnp.concatenate([guide_features(grid, guides, numbers), edge[None]])
     fine = fit(grid, features, coarse)
-    reference = level**2 + 0.01 * mean**2
+    reference = luminance**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     merged = merged + share * (fine.coefficients - coarse.coefficients)
-    return Step(grid, fine, coarse, level, share, merged)
+    return Step(grid, fine, coarse, luminance, share, merged)

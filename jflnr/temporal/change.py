@@ -86,8 +86,10 @@ def find_change(
     # Its variance is told by its residuals, which without a change are the differences themselves.
     fit = fit_level(grid, shift, difference.shape[-1], jnp.ones(()), numbers)
     found = predict(fit.coefficients, mean_guides(grid.moments, shift.size))
-    level = total / jnp.maximum(count, 1e-12)
-    share, noise, evidence = _judge(fit, found, level, grid.moments[0] > 1e-12, evidence, caution)
+    luminance = total / jnp.maximum(count, 1e-12)
+    share, noise, evidence = _judge(
+        fit, found, luminance, grid.moments[0] > 1e-12, evidence, caution
+    )
     noise += _uncovered(known, new)
     signal = apply(share * fit.coefficients, guides, shift, BLOCK)
     noise = apply(noise[None, None], jnp.zeros((*light.shape, 0)), shift[:0], BLOCK)
@@ -113,7 +115,7 @@ def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:
 def _judge(
     fit: Fit,
     found: jax.Array,
-    level: jax.Array,
+    luminance: jax.Array,
     there: jax.Array,
     evidence: Evidence,
     caution: jax.Array | float,
@@ -125,11 +127,11 @@ def _judge(
     not. Most of what is added to the history now will not be found again. The details are the more
     wrong, the more of the light is new.
 
-    found, level: `(h, w)`, brightness of the fit and of the history. there: `(h, w)`, boolean.
+    found, luminance: `(h, w)`, brightness of the fit and of the history. there: `(h, w)`, boolean.
     Returns the share and the noise, `(h, w)`, and the evidence for the next frame.
     """
-    relative = 1 / (level + DIM) ** 2
-    planes = found**2 * relative, fit.variance * relative, found**2, level**2, 0 * level + 1
+    relative = 1 / (luminance + DIM) ** 2
+    planes = found**2 * relative, fit.variance * relative, found**2, luminance**2, 0 * luminance + 1
     power, noise, new, old, count = gather(jnp.where(there, jnp.stack(planes), 0), fit.window)
     power = jnp.maximum(evidence.power + NEWEST * (power - evidence.power), 1e-12)
     noise = evidence.noise + NEWEST * (noise - evidence.noise)

@@ -19,7 +19,7 @@ from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.energy import rescale, restore
 from jflnr.regression.flr import FLR
 from jflnr.regression.moments import collect, collect_weighted, plane_count
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.resampling import double, halve
 from jflnr.regression.solve import solve, solve_strips
 from jflnr.regression.window import gather_moments, window_over
 from jflnr.temporal import (
@@ -75,7 +75,7 @@ STEPS = {
         lambda f, sigma, m: gather_moments(m, window_over(f, sigma), 1.3, 2, 1),
         (normal(2, 4, 5), 1.5, normal(plane_count(2, 1), 4, 5)),
     ),
-    "pyramid": (lambda p: double(halve(p), 5, 7), (normal(2, 5, 7),)),
+    "resampling": (lambda p: double(halve(p), 5, 7), (normal(2, 5, 7),)),
     "strips": (
         lambda m, e, p: solve_strips(m, jnp.asarray(SHIFT), e, p, 2),
         (moments_of(2, 2, 2, 3), positive(2, 3), positive(2, 3)),

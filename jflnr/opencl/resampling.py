@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/pyramid.cl; its twin in JAX is jflnr/regression/pyramid.py."""
+"""Host side of kernels_cl/resampling.cl; its twin in JAX is jflnr/regression/resampling.py."""
 
 from __future__ import annotations
 
@@ -28,5 +28,5 @@ def _halve(
 ) -> Grid:
     """strides: from one row, group of neighbours and plane to the next."""
     arguments = (halves.number, *size, *strides, *halves.size, planes, halves.planes)
-    run.launch("halve", "pyramid.cl", halves, arguments)
+    run.launch("halve", "resampling.cl", halves, arguments)
     return halves
