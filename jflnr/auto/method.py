@@ -15,7 +15,7 @@ import numpy as np
 from jflnr.auto import plan as plans
 from jflnr.auto.blocks import Models, Unfinished, fit, refine
 from jflnr.auto.collected import Collected, collect_frame, hold
-from jflnr.auto.glance import is_simple
+from jflnr.auto.complexity import is_simple
 from jflnr.auto.weights import SETTINGS
 from jflnr.frame import Array, Frame
 from jflnr.images import guides as guide_layers
@@ -145,10 +145,10 @@ def _planned(
     pixels = frame.depth.size
     first = plans.first(bool(is_simple(frame)), limits, pixels)
     fitted = _fitted(frame, names, first)
-    look = plans.look_at(fitted.models)
+    statistics = plans.statistics_of(fitted.models)
     network = set(names) in (set(NEEDED), set(GUIDES)) and frame.indirect.shape[-1] % 3 == 0
     order = np.asarray(fitted.models.order)
-    return plans.plan(first, look, names, order, pixels, limits, network), fitted
+    return plans.plan(first, statistics, names, order, pixels, limits, network), fitted
 
 
 def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:

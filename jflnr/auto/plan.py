@@ -42,7 +42,7 @@ class Limits(NamedTuple):
     seconds: float | None = None
 
 
-class Look(NamedTuple):
+class Statistics(NamedTuple):
     """A frame as the form that is tried first sees it; the arguments of the predictions.
 
     decibels: PSNR that the expected error leaves. share: of the finest step that is signal.
@@ -112,7 +112,7 @@ class Plan:
         ]
 
 
-def look_at(models: Models) -> Look:
+def statistics_of(models: Models) -> Statistics:
     """Numbers of one frame from the models of its blocks."""
     luminance, error, share, order, width = (
         np.asarray(planes, np.float64)
@@ -126,7 +126,7 @@ def look_at(models: Models) -> Look:
     slope = np.where(scale * luminance < 1, scale / GAMMA * shown ** (1 / GAMMA - 1), 0)
     displayed = max(float(np.mean((error * slope**2)[used])), 1e-9)
     relative = error / (luminance**2 + 0.01 * mean**2)
-    return Look(
+    return Statistics(
         decibels=-10 * float(np.log10(displayed)),
         share=float(np.mean(share[used])),
         noise=float(np.mean(np.log10(np.maximum(relative[used], 1e-9)))),
@@ -135,9 +135,9 @@ def look_at(models: Models) -> Look:
     )
 
 
-def predict(look: Look, first: str) -> dict[str, float]:
+def predict(statistics: Statistics, first: str) -> dict[str, float]:
     """PSNR that the form which looked and those larger are expected to reach."""
-    values = np.array([1, *look])
+    values = np.array([1, *statistics])
     return {form: float(values @ np.array(w)) for form, w in PREDICTIONS[first].items()}
 
 
@@ -165,7 +165,7 @@ def first(simple: bool, limits: Limits, pixels: int) -> str:
 
 def plan(
     first: str,
-    look: Look,
+    statistics: Statistics,
     names: tuple[str, ...],
     order: np.ndarray,
     pixels: int,
@@ -176,7 +176,7 @@ def plan(
 
     order: `(h, w)`, of the blocks of that form. network: whether flnr can be used.
     """
-    decibels = predict(look, first)
+    decibels = predict(statistics, first)
     if not network:
         del decibels["flnr"]
     cost = {

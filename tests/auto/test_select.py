@@ -8,7 +8,7 @@ import pytest
 import jflnr
 from jflnr.auto import plan as plans
 from jflnr.auto.collected import hold
-from jflnr.auto.glance import is_simple
+from jflnr.auto.complexity import is_simple
 from jflnr.auto.method import denoise_on_blocks
 from jflnr.auto.plan import choose
 
