@@ -105,14 +105,12 @@ def plan_of(frame: Frame, guides: Sequence[str] | None = None) -> plans.Plan:
     return _planned(_on_device(inputs), names, limits)[0]
 
 
-def denoise_on_blocks(
-    frame: Frame, form: str, guides: Sequence[str] | None = None
-) -> tuple[Array, Models]:
+def denoise_on_blocks(frame: Frame, form: str) -> tuple[Array, Models]:
     """One of the forms of `BLOCKS` by itself, with all guides: its light, and the models.
 
-    frame, guides: as of `denoise`. The errors of the models are in the unit of the light.
+    frame: as of `denoise`. The errors of the models are in the unit of the light.
     """
-    names, inputs = prepare(frame, guides, Auto())
+    names, inputs = prepare(frame, None, Auto())
     fitted = _fitted(_on_device(inputs), names, form)
     models = _finished(fitted, form)
     image = _image(fitted, models, tuple(range(len(names))))

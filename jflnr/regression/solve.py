@@ -15,8 +15,6 @@ from jflnr.regression.strips import map_rows
 # Roundings that a variance, a difference of two sums, may be off by: of plain windows, and of
 # edge-aware ones, which may lie far from the shift and hold few blocks.
 ROUNDING, ROUNDING_OF_STRIPS = 8, 64
-# Blocks that are solved at a time.
-STRIP = 4096
 
 
 class NormalEquations(NamedTuple):
@@ -120,4 +118,4 @@ def solve_strips(
         system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING_OF_STRIPS)
         return system.models(eliminate(system.correlation, system.right))
 
-    return map_rows(solve_some, (moments, eps, eps_prime), STRIP)
+    return map_rows(solve_some, (moments, eps, eps_prime))
