@@ -1,7 +1,5 @@
 """Work on many machines, by Dask: one job at a time per worker, none lost, none done twice."""
 
-from __future__ import annotations
-
 import logging
 import os
 import sys

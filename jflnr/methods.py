@@ -17,8 +17,6 @@ frames cannot be cut has `denoise(inputs, names)`, and one with a history of its
 and `step(state, frame)`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 from typing import Any

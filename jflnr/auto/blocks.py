@@ -7,8 +7,6 @@ only shifted; whole ones can follow, when it is known whether they are worth the
 docs/select.md derives the steps.
 """
 
-from __future__ import annotations
-
 import functools
 from typing import NamedTuple
 

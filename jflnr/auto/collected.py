@@ -1,7 +1,5 @@
 """What a fit needs to know of a frame's pixels: one pass, and parts of what it brings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Whether a scene is simple, from a sparse grid of its pixels, before any pass over all of them."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 

@@ -7,8 +7,6 @@ the fit is known as soon as it is taken in, whatever comes later: with z = L^-1 
 by group is the average of these models (Hansen, Least squares model averaging, 2007).
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import NamedTuple

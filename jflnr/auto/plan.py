@@ -1,7 +1,5 @@
 """What to denoise a frame with: what is predicted of each form, and the smallest that is enough."""
 
-from __future__ import annotations
-
 import functools
 import time
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What every block counts: one over the variance that a first fit expects of its light."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import jax

@@ -1,7 +1,5 @@
 """Blockwise multi-order feature regression: phase II of BMFR (Koskela et al. 2019, section 3.3)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

@@ -1,7 +1,5 @@
 """The images that a regression takes: the light, the guides, and which pixels count."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 from collections.abc import Callable, Sequence

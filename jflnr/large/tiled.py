@@ -4,8 +4,6 @@ Stages that read pixels run on strips of whole rows, the others on tiles of bloc
 on with as much around it as the stage says that it looks at, so that the result is the whole's.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Training examples: crops of frames under ever other noise, with all that precedes the network."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """What training minimises: errors of the picture as it is displayed."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 

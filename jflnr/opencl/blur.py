@@ -1,7 +1,5 @@
 """Host side of kernels_cl/blur.cl; its twin in JAX is jflnr/regression/blur.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

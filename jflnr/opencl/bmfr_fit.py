@@ -1,7 +1,5 @@
 """Host side of kernels_cl/bmfr/fit.cl and weighted_sum.cl; the twin is bmfr/fit.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.bmfr.fit import FLAT, grid_offset

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/energy.cl and rescale.cl; the twin is jflnr/regression/energy.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.context import Context

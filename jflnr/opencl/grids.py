@@ -1,7 +1,5 @@
 """Grids of blocks on the device, as kernels_cl/grids.h describes them."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -3,8 +3,6 @@
 Its twin in JAX is jflnr/regression/level.py.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from jflnr.opencl.grids import Grid, Run

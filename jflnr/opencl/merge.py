@@ -1,7 +1,5 @@
 """Host side of kernels_cl/merge.cl; its twin in JAX is jflnr/regression/merge.py."""
 
-from __future__ import annotations
-
 from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import Level, new_models
 from jflnr.opencl.resampling import halve

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/moments.cl; its twin in JAX is jflnr/regression/moments.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.context import Context

@@ -1,7 +1,5 @@
 """Where the time goes: every kernel's share, next to what the device's memory can do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/resampling.cl; its twin in JAX is jflnr/regression/resampling.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.grids import GROUP, Grid, Run

@@ -3,8 +3,6 @@
 Its twin in JAX is jflnr/temporal/change.py.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

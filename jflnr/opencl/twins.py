@@ -1,7 +1,5 @@
 """Which function runs a method on an OpenCL device."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/weighted_moments.cl; the twin is in jflnr/regression/moments.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.grids import Grid, Run, brightness_defines

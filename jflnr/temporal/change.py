@@ -5,8 +5,6 @@ the guides as the light does. So it is fitted like light, by wide windows, and w
 signal is added to the history, which thus moves with the light instead of being thrown away.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

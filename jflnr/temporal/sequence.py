@@ -4,8 +4,6 @@ The noisy light is averaged over time, the spatial method fits the average, and 
 averaged again. What the light has become since is found first and added to both averages.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
