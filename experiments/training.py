@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,7 +23,7 @@ from jflnr.network import adam, examples, loss
 from jflnr.network.checkpoint import load_state, save_state
 from jflnr.network.examples import Example
 from jflnr.network.flnr import GUIDES
-from jflnr.network.train import Settings, batches
+from jflnr.network.train import Batches, Settings
 from jflnr.regression.flr import DEFAULT
 
 NAME = "training"
@@ -77,13 +76,13 @@ def train(
     if file.exists():
         (state, best), history = load_state(file, (state, best), about)
         spent = history[-1]["seconds"]
-    with contextlib.closing(batches(records, settings, int(state.step))) as coming:
+    with Batches(records, settings) as batches:
         while spent < (1 if quick else TRAINING):
             start, losses = time.process_time(), []
             for step in range(int(state.step), int(state.step) + settings.every):
                 # A slow start, then steps that shrink with the root of their number.
                 rate = settings.rate * min(1, (step + 1) / 100) / (1 + step / 2000) ** 0.5
-                state, value = _update(state, next(coming), np.float32(rate))
+                state, value = _update(state, batches(step), np.float32(rate))
                 losses.append(float(value))
             spent += time.process_time() - start
             scores = [quick_psnr(frame, of_paper(frame, state.average)) for frame in kept]

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
-import itertools
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,10 +100,10 @@ def train(
     top = max(history, key=lambda entry: (np.nan_to_num(entry.score), entry.step))
     step, losses, update = int(state.step), list[float](), _update()
     began = time.monotonic() - history[-1].seconds
-    with contextlib.closing(batches(records, settings, step)) as coming:
+    with Batches(records, settings) as batches:
         while (done := max((time.monotonic() - began) / seconds, step / steps)) < 1:
             rate = rate_at(step, done, settings)
-            state, value = update(state, next(coming), rate)
+            state, value = update(state, batches(step), rate)
             losses.append(float(value))
             step += 1
             over = time.monotonic() - began >= seconds or step >= steps
@@ -143,27 +141,38 @@ def _update() -> Callable[[Adam, Example, np.float32], tuple[Adam, jax.Array]]:
     return jax.jit(update)
 
 
-def batches(
-    records: Sequence[np.ndarray], settings: Settings, step: int
-) -> Generator[Example, None, None]:
-    """The batches from a step on, on the devices, each drawn while the one before is worked on."""
-    devices = jax.local_devices()
-    if settings.batch % len(devices):
-        raise ValueError(
-            f"batch is {settings.batch}; it must be a multiple of the {len(devices)} devices"
-        )
-    sharding = NamedSharding(Mesh(np.array(devices), ("batch",)), PartitionSpec("batch"))
+class Batches:
+    """Batches by the number of the step, each drawn while the one before is worked on."""
 
-    def drawn(step: int) -> Example:
-        random = np.random.default_rng([settings.seed, step])
-        chosen = random.choice(len(records), settings.batch)
-        return jax.tree.map(lambda *a: np.stack(a), *(draw(records[i], random) for i in chosen))
+    def __init__(self, records: Sequence[np.ndarray], settings: Settings) -> None:
+        self.records, self.settings = records, settings
+        devices = jax.local_devices()
+        if settings.batch % len(devices):
+            raise ValueError(
+                f"batch is {settings.batch}; it must be a multiple of the {len(devices)} devices"
+            )
+        mesh = Mesh(np.array(devices), ("batch",))
+        self.sharding = NamedSharding(mesh, PartitionSpec("batch"))
+        self.pool = ThreadPoolExecutor(1)
+        self.next: dict[int, Any] = {}
 
-    with ThreadPoolExecutor(1) as pool:
-        coming = pool.submit(drawn, step)
-        for later in itertools.count(step + 1):
-            batch, coming = coming, pool.submit(drawn, later)
-            yield jax.device_put(batch.result(), sharding)
+    def __enter__(self) -> Batches:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.pool.shutdown(cancel_futures=True)
+
+    def __call__(self, step: int) -> Example:
+        """The examples of this step, on the devices."""
+        drawn = self.next.pop(step, None) or self.pool.submit(self._draw, step)
+        self.next[step + 1] = self.pool.submit(self._draw, step + 1)
+        return jax.device_put(drawn.result(), self.sharding)
+
+    def _draw(self, step: int) -> Example:
+        random = np.random.default_rng([self.settings.seed, step])
+        chosen = random.choice(len(self.records), self.settings.batch)
+        drawn = (draw(self.records[i], random) for i in chosen)
+        return jax.tree.map(lambda *a: np.stack(a), *drawn)
 
 
 class Shown(NamedTuple):
