@@ -1,7 +1,5 @@
 """Frames one after another, the next being read and the last being written meanwhile."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor

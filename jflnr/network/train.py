@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,7 +95,7 @@ def train(
         raise ValueError("there are no frames to train on")
     params = flnr.init(jax.random.key(settings.seed), settings.widths)
     state, best = adam.start(params), params
-    score = Validation(validation)
+    score = functools.partial(validate, list(before_validation(validation)))
     history = [Progress(0, 0.0, float("nan"), score(params))]
     run = {"settings": repr(settings)}
     if state_file is not None and state_file.exists():
@@ -204,35 +204,27 @@ class Shown(NamedTuple):
     target: np.ndarray
 
 
-class Validation:
-    """Mean PSNR over frames with a reference, all before the network done once."""
-
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.frames = [shown for path in paths for shown in self._frames(path)]
-
-    def __call__(self, params: unet.Params) -> dict[str, float]:
-        """In dB by samples per pixel, by the protocol of DESIGN.md."""
-        found: dict[str, list[float]] = {}
-        for spp, read, factor, target in self.frames:
-            picture = factor * np.asarray(_corrected(params, read), np.float64)
-            psnr = metrics.psnr(metrics.display(picture, 1), target)
-            found.setdefault(str(spp), []).append(psnr)
-        return {spp: float(np.mean(values)) for spp, values in found.items()}
-
-    @staticmethod
-    def _frames(path: Path) -> list[Shown]:
+def before_validation(paths: Sequence[Path]) -> Iterator[Shown]:
+    """Frames with a reference, all before the network done once."""
+    for path in paths:
         frame, light = examples.layers(path)
         albedo = np.asarray(frame.albedo, np.float64)
         wanted = albedo * np.asarray(frame.reference)
         scale = metrics.exposure(wanted)
-        found = []
-        for spp in COUNTS:
-            if spp in light:
-                noisy = dataclasses.replace(frame, indirect=light[spp][0])
-                read, unit = before_network(noisy)
-                factor = albedo * (unit * scale)
-                found.append(Shown(spp, read, factor, metrics.display(wanted, scale)))
-        return found
+        for spp in (spp for spp in COUNTS if spp in light):
+            read, unit = before_network(dataclasses.replace(frame, indirect=light[spp][0]))
+            factor, target = albedo * (unit * scale), metrics.display(wanted, scale)
+            yield Shown(spp, read, factor, target)
+
+
+def validate(frames: Sequence[Shown], params: unet.Params) -> dict[str, float]:
+    """Mean PSNR in dB by samples per pixel, by the protocol of DESIGN.md."""
+    found: dict[str, list[float]] = {}
+    for spp, read, factor, target in frames:
+        picture = factor * np.asarray(_corrected(params, read), np.float64)
+        psnr = metrics.psnr(metrics.display(picture, 1), target)
+        found.setdefault(str(spp), []).append(psnr)
+    return {spp: float(np.mean(values)) for spp, values in found.items()}
 
 
 @jax.jit
