@@ -26,7 +26,7 @@ def start(params: Any) -> Adam:
     """The state before the first step."""
     params = jax.tree.map(jnp.asarray, params)
     zeros = jax.tree.map(jnp.zeros_like, params)
-    return Adam(params, zeros, zeros, params, jnp.asarray(0))
+    return Adam(params, zeros, zeros, params, jnp.int32(0))
 
 
 def update(state: Adam, gradient: Any, rate: jax.Array) -> Adam:

@@ -112,6 +112,8 @@ def train(
 
     try:
         with Batches(records, settings) as batches:
+            # As it comes out of a step, or that would be compiled twice.
+            state = jax.device_put(state, batches.replicated)
             if max(history[-1].seconds / seconds, step / steps) < 1:
                 update(state, batches(step), np.float32(0))  # compiled, and nothing else
             began = time.monotonic() - history[-1].seconds
@@ -173,6 +175,7 @@ class Batches:
             )
         mesh = Mesh(np.array(devices), ("batch",))
         self.sharding = NamedSharding(mesh, PartitionSpec("batch"))
+        self.replicated = NamedSharding(mesh, PartitionSpec())
         self.pool = ThreadPoolExecutor(1)
         self.next: dict[int, Any] = {}
 

@@ -115,9 +115,11 @@ def test_time_counts_from_the_first_step(records, settings, monkeypatch):
         clock[0] += moves.pop()
         return real(*given)
 
+    compiled = real._cache_size()
     monkeypatch.setattr(train, "_update", lambda: update)
     monkeypatch.setattr(train.time, "monotonic", lambda: clock[0])
     assert train.train(records, [], settings, seconds=3).best.step == 3
+    assert real._cache_size() <= compiled + 1
 
 
 def test_a_state_that_is_none_is_refused(records, settings, tmp_path):
