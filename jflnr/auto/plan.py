@@ -133,12 +133,6 @@ def statistics_of(models: Models) -> Statistics:
     )
 
 
-def predict(statistics: Statistics, first: str) -> dict[str, float]:
-    """PSNR that the form which looked and those larger are expected to reach."""
-    values = np.array([1, *statistics])
-    return {form: float(values @ np.array(w)) for form, w in PREDICTIONS[first].items()}
-
-
 def worth_reading(models: Models, names: Sequence[str]) -> tuple[str, ...]:
     """The guides that do something inside blocks; the others may be held at each block's mean."""
     expected = float(jnp.mean(models.error))
@@ -174,7 +168,8 @@ def plan(
 
     order: `(h, w)`, of the blocks of that form. network: whether flnr can be used.
     """
-    decibels = predict(statistics, first)
+    values = np.array([1, *statistics])
+    decibels = {form: float(values @ np.array(w)) for form, w in PREDICTIONS[first].items()}
     if not network:
         del decibels["flnr"]
     cost = {

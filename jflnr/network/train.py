@@ -102,7 +102,7 @@ def train(
         (state, best), saved = load_state(state_file, (state, best), run)
         history = [Progress(*entry) for entry in saved]
     top = max(history, key=lambda entry: (np.nan_to_num(entry.score), entry.step))
-    step, losses, update = int(state.step), list[float](), _update()
+    step, losses = int(state.step), list[float]()
     stopped, began = False, 0.0
     spent = lambda: time.monotonic() - began
 
@@ -115,10 +115,10 @@ def train(
             # As it comes out of a step, or that would be compiled twice.
             state = jax.device_put(state, batches.replicated)
             if max(history[-1].seconds / seconds, step / steps) < 1:
-                update(state, batches(step), np.float32(0))  # compiled, and nothing else
+                _update(state, batches(step), np.float32(0))  # compiled, and nothing else
             began = time.monotonic() - history[-1].seconds
             while (done := max(spent() / seconds, step / steps)) < 1:
-                state, value = update(state, batches(step), rate_at(step, done, settings))
+                state, value = _update(state, batches(step), rate_at(step, done, settings))
                 losses.append(float(value))
                 step += 1
                 if step % settings.every == 0 or spent() >= seconds or step >= steps:
@@ -149,18 +149,15 @@ def rate_at(step: int, done: float, settings: Settings) -> np.float32:
     return np.float32(settings.rate * min(1, (step + 1) / WARM_UP) * falling + LEAST_RATE)
 
 
-@functools.cache
-def _update() -> Callable[[Adam, Example, np.float32], tuple[Adam, jax.Array]]:
-    """A step, compiled once for all runs."""
+@jax.jit
+def _update(state: Adam, batch: Example, rate: Any) -> tuple[Adam, jax.Array]:
+    """A step, and the mean loss before it."""
 
-    def mean_loss(params: unet.Params, batch: Example) -> jax.Array:
+    def mean_loss(params: unet.Params) -> jax.Array:
         return jnp.mean(jax.vmap(loss.relative_error, in_axes=(None, 0))(params, batch))
 
-    def update(state: Adam, batch: Example, rate: Any) -> tuple[Adam, jax.Array]:
-        value, gradient = jax.value_and_grad(mean_loss)(state.params, batch)
-        return adam.update(state, gradient, rate), value
-
-    return jax.jit(update)
+    value, gradient = jax.value_and_grad(mean_loss)(state.params)
+    return adam.update(state, gradient, rate), value
 
 
 class Batches:

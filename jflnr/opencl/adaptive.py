@@ -1,7 +1,5 @@
 """Adaptive FLR on OpenCL devices: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

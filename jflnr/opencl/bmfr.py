@@ -1,7 +1,5 @@
 """BMFR on an OpenCL device: host side of kernels_cl/bmfr/; its twin is jflnr/bmfr/pipeline.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """FLNR on an OpenCL device: the steps of jflnr/network/flnr.py (docs/flnr.md)."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fast Local Regression on an OpenCL device: moments, blur, solve, apply (section 3.2)."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

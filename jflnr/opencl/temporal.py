@@ -1,7 +1,5 @@
 """Denoising with a history on an OpenCL device: the steps of jflnr/temporal/sequence.py."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The arguments of a regression, checked at its boundary on static facts."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any
