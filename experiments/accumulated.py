@@ -126,11 +126,7 @@ def start(frame: Frame) -> State:
 
 @functools.partial(jax.jit, static_argnames=("names", "averaged"))
 def step(
-    state: State,
-    frame: Frame,
-    known: Known,
-    names: tuple[str, ...],
-    averaged: frozenset[str],
+    state: State, frame: Frame, known: Known, names: tuple[str, ...], averaged: frozenset[str]
 ) -> tuple[State, jax.Array]:
     """`flr_adaptive` with averages between its stages. known: one for all frames."""
     images, state = METHOD.images(frame, names), dict(state)

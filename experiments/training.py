@@ -13,12 +13,13 @@ import numpy as np
 
 from experiments import data, resume
 from experiments.methods import Method
+from experiments.peers import paper_network as paper
 from experiments.results import Parts
 from experiments.sweeps import Sweep, everything, method, named
 from experiments.tune import quick_psnr
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import frame_inputs, robust_images
-from jflnr.network import adam, examples, loss, paper
+from jflnr.network import adam, examples, loss
 from jflnr.network.checkpoint import load_state, save_state
 from jflnr.network.examples import Example
 from jflnr.network.flnr import GUIDES

@@ -101,14 +101,20 @@ def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def images(picture: Picture, spp: int) -> dict[str, Array]:
     """Noisy, ours, and OIDN with auxiliaries as they are and prefiltered."""
     albedo, normal = np.clip(picture.albedo, 0, 1), picture.seen_normal
-    clean = (oidn(albedo=albedo), oidn(normal=normal))
-    denoise = jax.jit(denoise_picture)
     return {
         "noisy": picture.beauty,
-        "ours": np.asarray(denoise(picture, samples=float(spp)).beauty),
+        "ours": np.asarray(jax.jit(denoise_picture)(picture, samples=float(spp)).beauty),
         "raw": oidn(color=picture.beauty, albedo=albedo, normal=normal),
-        "clean": oidn(color=picture.beauty, albedo=clean[0], normal=clean[1], cleanAux=True),
+        "clean": best_of_oidn(picture),
     }
+
+
+def best_of_oidn(picture: Picture) -> np.ndarray:
+    """OIDN with prefiltered auxiliaries, `(H, W, 3)`."""
+    albedo = oidn(albedo=np.clip(picture.albedo, 0, 1))
+    return oidn(
+        color=picture.beauty, albedo=albedo, normal=oidn(normal=picture.seen_normal), cleanAux=True
+    )
 
 
 def oidn(*, cleanAux: bool = False, **layers: Any) -> np.ndarray:

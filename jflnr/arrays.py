@@ -1,7 +1,5 @@
 """Trees of arrays in a file: a plain .npz, with a header of JSON. Nothing is ever unpickled."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

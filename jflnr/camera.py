@@ -43,12 +43,12 @@ class Camera(NamedTuple):
         axis, in a picture of the given size."""
         ahead = pixels[..., :1] * 0 + 1
         on_plane = -from_centre(pixels, width, height) / self._pixels(width, pixels)
-        local = _module_of(pixels).concatenate([on_plane, ahead], -1) * depth[..., None]
+        local = pixels.__array_namespace__().concatenate([on_plane, ahead], -1) * depth[..., None]
         return local @ self.to_world[:3, :3].T + self.to_world[:3, 3]
 
     def project(self, points: Any, width: int, height: int) -> Any:
         """Pixels `(..., 2)` of world points `(..., 3)`; NaN of those that are not ahead."""
-        xp = _module_of(points)
+        xp = points.__array_namespace__()
         local = (points - self.to_world[:3, 3]) @ self.to_world[:3, :3]
         ahead = local[..., 2:] > 0
         on_plane = xp.where(ahead, local[..., :2] / xp.where(ahead, local[..., 2:], 1), xp.nan)
@@ -57,7 +57,7 @@ class Camera(NamedTuple):
 
     def _pixels(self, width: int, like: Any) -> Any:
         """Pixels per unit on the plane one unit ahead."""
-        xp = _module_of(like)
+        xp = like.__array_namespace__()
         return width / 2 / xp.tan(xp.radians(self.fov_x) / 2)
 
 
@@ -70,8 +70,3 @@ def centres(width: int, height: int) -> np.ndarray:
 def from_centre(pixels: Any, width: int, height: int) -> Any:
     """Pixels `(..., 2)` from the centre of the picture, where the view axis passes it."""
     return pixels - np.array([width / 2, height / 2], pixels.dtype)
-
-
-def _module_of(array: Any) -> Any:
-    """The module whose functions take this array."""
-    return array.__array_namespace__()

@@ -1,7 +1,5 @@
 """Work on many machines, by Dask: one job at a time per worker, none lost, none done twice."""
 
-from __future__ import annotations
-
 import logging
 import os
 import sys
@@ -36,7 +34,7 @@ def each(
         known = False
         while left:
             try:
-                with _client(scheduler) as client:
+                with _distributed().Client(scheduler, timeout=10) as client:
                     known, deadline = True, time.monotonic() + PATIENCE
                     for number, result, error in _finished(client, work, left):
                         job = left.pop(number)
@@ -76,9 +74,9 @@ def _cluster(address: str) -> Iterator[str]:
     """The address of a scheduler: the one given, or of workers on this machine's cores."""
     if address:
         yield address
-        return
-    with local_cluster(cores()) as local:
-        yield local.scheduler_address
+    else:
+        with local_cluster(cores()) as local:
+            yield local.scheduler_address
 
 
 def local_cluster(count: int) -> Any:
@@ -90,12 +88,6 @@ def local_cluster(count: int) -> Any:
         memory_limit=0,
         silence_logs=logging.ERROR,
     )
-
-
-@contextmanager
-def _client(address: str) -> Iterator[Any]:
-    with _distributed().Client(address, timeout=10) as client:
-        yield client
 
 
 def _connection_errors() -> tuple[type[BaseException], ...]:

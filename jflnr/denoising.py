@@ -15,10 +15,10 @@ import numpy as np
 from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
-from jflnr.lazy import check_not_forked, jax, jit
+from jflnr.lazy import check_not_forked, jax
 from jflnr.methods import BACKENDS, DEFAULT, default_of, method_of
 from jflnr.regression.arguments import block_for
-from jflnr.stages import Parts, regress
+from jflnr.stages import Parts, on_frame
 
 if TYPE_CHECKING:
     from jflnr.large.source import Rows
@@ -127,7 +127,7 @@ class Denoiser:
 
     def _checked(self, method: Any) -> Any:
         """The method, if it can do what is asked for."""
-        if self.backend not in method.backends:
+        if self.backend not in getattr(method, "backends", BACKENDS):
             raise ValueError(f"method {method.name} runs on the jax backend only")
         if self.guides is not None and (own := getattr(method, "features", None)):
             raise ValueError(
@@ -164,8 +164,11 @@ class Denoiser:
         if self.tile is not None:
             return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":
-            return _given(_whole(method, inputs, names), frame, out)
-        light = self._on_device(method)(method.images(inputs, names, smooth=self._smooth), out)
+            return _given(on_frame(method, inputs, names), frame, out)
+        from jflnr.opencl import smooth_guide
+
+        smooth = functools.partial(smooth_guide, context=self.context)
+        light = self._on_device(method)(method.images(inputs, names, smooth=smooth), out)
         return light if out is not None else _given({"image": light}, frame, None)
 
     @_own_settings
@@ -187,11 +190,6 @@ class Denoiser:
         if isinstance(self._device, Context):
             return self._device
         return default_context() if self._device is None else Context(self._device)
-
-    def _smooth(self, guide: Any, normal: Any, depth: Any) -> Any:
-        from jflnr.opencl import smooth_guide
-
-        return smooth_guide(guide, normal, depth, context=self.context)
 
     def _on_device(self, method: Any) -> Callable[..., Any]:
         from jflnr.opencl import twins
@@ -253,11 +251,6 @@ class Denoiser:
         home, guides = importlib.import_module(name), {} if own else {"guides": self.guides}
         step = functools.partial(home.step, method=method, **guides, **options)
         return functools.partial(home.start, **options), step
-
-
-@functools.partial(jit, static_argnames="names")
-def _whole(method: Any, frame: Frame, names: tuple[str, ...]) -> Parts:
-    return regress(method, method.images(frame, names))
 
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:

@@ -1,7 +1,5 @@
 """Writing files so that nothing is ever half-written, and bounds for what is read from them."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

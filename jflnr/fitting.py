@@ -1,8 +1,6 @@
 """Learning the numbers of FLR or adaptive FLR on frames with a reference, by gradient through the
 whole denoiser."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What one frame of a sequence leaves to the next, as a file: arrays, and a few words on them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple

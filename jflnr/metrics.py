@@ -85,9 +85,8 @@ def compare(picture: Array, reference: Array) -> dict[str, float | None]:
 
 def psnr(picture: np.ndarray, reference: np.ndarray) -> float:
     """Peak signal-to-noise ratio in dB of two displayed pictures; infinite if they are equal."""
-    from skimage.metrics import (
-        peak_signal_noise_ratio,
-    )  # takes most of a second, with what it needs
+    # Takes most of a second, with what it needs.
+    from skimage.metrics import peak_signal_noise_ratio
 
     with np.errstate(divide="ignore"):
         return float(peak_signal_noise_ratio(reference, picture, data_range=1))

@@ -1,7 +1,5 @@
 """The small file that the numbers of a method are kept in."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from pathlib import Path

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from jflnr.lazy import jnp
+from jflnr.lazy import jit, jnp
 
 # Arrays by name. Pixels lie in `(H, W, C)`, what is on blocks in `(..., h, w)`.
 Parts: TypeAlias = dict[str, Any]
@@ -37,6 +38,11 @@ class Stage:
     learn: Callable[[Any, Known, dict[str, Any]], Known] | None = None
     composes: bool = False
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those of what it gives."""
+        return tuple(name for name, _ in self.gives)
+
 
 def run(stages: Sequence[Stage], method: Any, parts: Parts, known: Known) -> tuple[Parts, Known]:
     """All stages on a whole frame: the arrays of each and all that became known."""
@@ -57,7 +63,13 @@ def regress(method: Any, images: Parts, composed: bool = True) -> Parts:
     """
     stages = [stage for stage in method.stages() if composed or not stage.composes]
     parts, _ = run(stages, method, images, method.known(images))
-    return {name: parts[name] for name, _ in stages[-1].gives}
+    return {name: parts[name] for name in stages[-1].names}
+
+
+@functools.partial(jit, static_argnames="names")
+def on_frame(method: Any, frame: Any, names: tuple[str, ...]) -> Parts:
+    """`regress` on the images that the method makes of a whole frame."""
+    return regress(method, method.images(frame, names))
 
 
 def compose(method: Any, parts: Parts) -> Any | None:

@@ -11,7 +11,7 @@
 #define FEATURE_PLANES (Q + 2 * REFINES)
 
 // features: the mean guides of each block, times guide_scale. And, if REFINES, brightness_scale
-// log(level / mean + 0.1) with the level of brightness that the coarser grids found, and that level.
+// log(luminance / mean + 0.1) with the luminance that the coarser grids found, and that level.
 //
 // found: models of the next coarser grid. Global size (pitch / WIDTH, h).
 kernel void features(
@@ -28,18 +28,18 @@ kernel void features(
     const real per_pixel = n > 1e-12f ? 1 / n : (real)0;
 #if REFINES
     const coarse_t coarse = coarse_at(found, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
-    real level = doubled(&coarse, LIGHT_PLANE(0));
+    real luminance = doubled(&coarse, LIGHT_PLANE(0));
 #endif
     for (int q = 0; q < Q; ++q) {
         const real guide = READ(moments + XX(q + 1, 0) * GROUP) * per_pixel;
         WRITE(guide_scale * guide, features + q * GROUP);
 #if REFINES
-        level += guide * doubled(&coarse, LIGHT_PLANE(q + 1));
+        luminance += guide * doubled(&coarse, LIGHT_PLANE(q + 1));
 #endif
     }
 #if REFINES
-    level = MAX(level, 0);
-    WRITE(brightness_scale * log(level / mean[0] + 0.1f), features + Q * GROUP);
-    WRITE(level, features + (Q + 1) * GROUP);
+    luminance = MAX(luminance, 0);
+    WRITE(brightness_scale * log(luminance / mean[0] + 0.1f), features + Q * GROUP);
+    WRITE(luminance, features + (Q + 1) * GROUP);
 #endif
 }

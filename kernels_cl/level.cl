@@ -100,11 +100,11 @@ kernel void fit(
     UNROLL
     for (int k = 0; k < (G + 1) * C; ++k) xy[k] *= per_pixel;
     variance = variance / (n * n);
-    real level = 0;
+    real luminance = 0;
 #pragma unroll
-    for (int c = 0; c < C; ++c) level += BRIGHTNESS(c) * xy[c];
-    level = MAX(level, 0);
-    real ridge = noise_ridge * variance / (level * level + 0.01f * mean[0] * mean[0]);
+    for (int c = 0; c < C; ++c) luminance += BRIGHTNESS(c) * xy[c];
+    luminance = MAX(luminance, 0);
+    real ridge = noise_ridge * variance / (luminance * luminance + 0.01f * mean[0] * mean[0]);
     ridge = MIN(ridge, 1);
 
     real coefficients[(G + 1) * C], zero = 0;  // stays 0 unless a coefficient is not finite

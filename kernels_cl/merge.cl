@@ -36,8 +36,8 @@ kernel void signal(
         d += READ(features + q * GROUP) / guide_scale * slope;
     }
     const real more = READ(fine + VARIANCE * GROUP) - doubled(&at, VARIANCE);
-    const real level = READ(features + (Q + 1) * GROUP);
-    const real reference = level * level + 0.01f * mean[0] * mean[0];
+    const real luminance = READ(features + (Q + 1) * GROUP);
+    const real reference = luminance * luminance + 0.01f * mean[0] * mean[0];
     const mask there = READ(moments + AT(x, y, pitch, COUNT)) > 1e-12f;
     WRITE(there ? d * d / reference : (real)0, signal);
     WRITE(there ? MAX(more, 0) / reference : (real)0, signal + GROUP);

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jflnr
-from jflnr import denoising
+from jflnr import denoising, stages
 from jflnr.metrics import measure
 
 
@@ -95,9 +95,9 @@ def test_without_ao_the_user_is_told(frame):
 
 def test_the_second_frame_does_not_recompile(frame):
     jflnr.denoise(frame)
-    before = denoising._whole.compiled()._cache_size()
+    before = stages.on_frame.compiled()._cache_size()
     jflnr.denoise(changed(frame, indirect=3 * frame.indirect, reference=None))
-    assert denoising._whole.compiled()._cache_size() == before
+    assert stages.on_frame.compiled()._cache_size() == before
 
 
 def test_gradients_reach_the_parameters(frame):

@@ -78,7 +78,7 @@ def test_what_jax_cannot_trace_is_one_sentence(frame: Frame, method: str, option
 @pytest.mark.parametrize(
     ("backend", "place", "error", "kind"),
     [
-        ("jax", "jflnr.denoising._whole", "jax.errors.JaxRuntimeError", MemoryError),
+        ("jax", "jflnr.denoising.on_frame", "jax.errors.JaxRuntimeError", MemoryError),
         ("opencl", "jflnr.opencl.twins.regress", "pyopencl.Error", OSError),
     ],
 )

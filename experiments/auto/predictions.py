@@ -17,7 +17,7 @@ from experiments.results import Parts, Row
 from experiments.resume import ROOT
 from experiments.tune import quick_psnr
 from jflnr.auto import plan as plans
-from jflnr.auto.glance import is_simple
+from jflnr.auto.complexity import is_simple
 from jflnr.auto.method import denoise_on_blocks
 
 NAME = "auto-predictions"
@@ -47,7 +47,7 @@ def one(key: str) -> dict[str, Any]:
         image, models = denoise_on_blocks(frame, form)
         row["psnr"][form] = quick_psnr(frame, image)
         if form == plans.start_of(form):
-            row["looks"][form] = list(plans.look_at(models))
+            row["looks"][form] = list(plans.statistics_of(models))
     row["psnr"]["flnr"] = quick_psnr(frame, jflnr.denoise(frame, "flnr"))
     return row
 

@@ -1,3 +1,3 @@
 """Pictures of the pages that show frames: `python -m experiments pictures NAME...`."""
 
-NAMES = ("animation", "bmfr", "failures", "figure9", "flnr", "room", "seams", "steps")
+NAMES = ("animation", "bmfr", "failures", "figure9", "flnr", "seams", "steps", "whole")

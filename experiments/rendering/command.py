@@ -6,6 +6,7 @@ render SCENE -o FOLDER --motion MOTION --frames N      a sequence
 render again FRAME.exr -o FILE.exr       a finished frame once more, as its header says
 render families [-o docs/scenes.png]    one scene of each family on a contact sheet
 render data [--split train|val|test] [--frames N]       the data set; resumes
+render pictures [--split ...] [--frames N]      whole pictures with materials; resumes
 render targets [--folder cache/frames]  what training frames are trained on; resumes
 render shots [--folder cache/sequences]         those of the experiment `sequences`; resumes
 render statistics [-o docs/scene_statistics.png]        1-spp statistics against real rooms
@@ -21,7 +22,7 @@ from pathlib import Path
 
 from experiments.rendering import backend
 
-VERBS = ("again", "families", "data", "targets", "shots", "statistics", "efficiency")
+VERBS = ("again", "families", "data", "pictures", "targets", "shots", "statistics", "efficiency")
 MOTIONS = ("static", "camera", "light", "switch", "object")
 
 
@@ -54,6 +55,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
         "again": _again,
         "families": _families,
         "data": _data,
+        "pictures": _pictures,
         "targets": _targets,
         "shots": _shots,
         "statistics": _statistics,
@@ -107,10 +109,19 @@ def _families(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
 
 
-def _data(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
+def _pictures(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--folder", type=Path, default=Path("cache/whole"))
+    _split(parser)
+
+
+def _split(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=int, help="so many; 400 of train, all of val and test")
     parser.add_argument("--split", choices=("train", "val", "test"), default="train")
+
+
+def _data(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--folder", type=Path, default=Path("cache/frames"))
+    _split(parser)
     parser.add_argument(
         "--cluster",
         nargs="?",

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.rendering import frame, sequence
+from experiments.rendering import frame, pictures, sequence
 from experiments.rendering.manifest import Manifest
 from experiments.rendering.reference import Goal
 from experiments.rendering.sampling import stream_seed
@@ -23,6 +23,7 @@ from jflnr import read_header
 
 # Training frames are many rather than good: their references are what denoising them leaves.
 TRAINING, SAMPLES = (1, 1, 1, 1, 4, 4, 16, 16), 96
+VIEWS = 12  # whole pictures of each scene of val and test
 NARROW = 0.6  # of every second training view's field of view: as a part of a larger frame
 NOISY = (1, 2, 4, 8, 16, 32, 64, 1, 1, 1)
 ERROR = 0.02
@@ -44,7 +45,8 @@ SEQUENCE_GOAL = Goal(0.05, seconds=240)  # of each of its references
 class Job:
     """One frame to render; `split` is the folder that it goes to.
 
-    With a `motion` it is the frame `number` of a sequence, in a folder of its own.
+    With a `motion` it is the frame `number` of a sequence, in a folder of its own. A `whole`
+    picture has all light and materials of all kinds.
     """
 
     scene: str
@@ -54,6 +56,7 @@ class Job:
     split: str = "train"
     motion: str = ""
     number: int = 0
+    whole: bool = False
 
     @property
     def name(self) -> str:
@@ -86,6 +89,15 @@ def evaluation_jobs(split: str) -> Iterator[Job]:
         yield Job(scene, 0, 1920, 1080, split)
     for scene, number in itertools.product(scenes, range(LENGTH)):
         yield Job(scene, 0, 640, 360, split, MOTIONS[scene], number)
+
+
+def picture_jobs(split: str) -> Iterator[Job]:
+    """Whole pictures: the views of the training frames, or a few of each scene of val and test."""
+    if split == "train":
+        yield from (replace(job, whole=True) for job in training_jobs())
+        return
+    for view, scene in itertools.product(range(VIEWS), VAL if split == "val" else TEST):
+        yield Job(scene, RANDOM + view, 320, 184, split, whole=True)
 
 
 def settings_of(job: Job) -> frame.Settings:
@@ -157,20 +169,25 @@ def render_job(folder: Path, job: Job) -> dict[str, Any] | str:
     if found is None:
         return "no valid view was found"
     camera, near = found
-    if job.split == "train" and job.view % 2:
+    if (job.split == "train" or job.whole) and job.view % 2:
         camera = camera._replace(fov_x=narrowed(camera.fov_x))
+    facts = {"scene": job.scene, "view": job.view, "split": job.split}
+    if job.whole:
+        seed = stream_seed(job.scene, job.view, "whole")
+        layers, made = pictures.render(source, camera, seed, job.width, job.height)
+        frame.write(folder / job.name, layers, facts | made)
+        return _without_matrix(facts | made)
     state = folder / "state" / (job.name.replace("/", "_") + ".npz")
     settings = settings_of(job)
     if job.motion:
         shot = sequence.Shot.of(source, camera, job.motion, LENGTH)
         twin = folder / replace(job, number=shot.twin(job.number)).name
-        layers, facts = sequence.render(shot, job.number, settings, near, twin, state)
+        layers, made = sequence.render(shot, job.number, settings, near, twin, state)
     else:
-        layers, facts = frame.render(source.scene, camera, settings, near, state)
-    facts = {"scene": job.scene, "view": job.view, "split": job.split} | facts
-    frame.write(folder / job.name, layers, facts)
+        layers, made = frame.render(source.scene, camera, settings, near, state)
+    frame.write(folder / job.name, layers, facts | made)
     state.unlink(missing_ok=True)
-    return _without_matrix(facts)
+    return _without_matrix(facts | made)
 
 
 def _without_matrix(facts: dict[str, Any]) -> dict[str, Any]:

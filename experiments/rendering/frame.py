@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +20,11 @@ from experiments.rendering.tracer import Tracer
 from jflnr.camera import Camera
 from jflnr.exr import layers_of, read_attributes, read_channels, write_channels
 
-AXES = {"normal": "XYZ", "position": "XYZ", "depth": "Z", "ao": "Y", "mask": "Y", "motion": "XY"}
+AXES = {
+    "normal": "XYZ", "seen_normal": "XYZ", "position": "XYZ", "depth": "Z",
+    "ao": "Y", "mask": "Y", "alpha": "A", "motion": "XY",
+}  # fmt: skip
+NUMBER = re.compile(r"_\d+(_[a-z])?$")
 SINGLE = ("depth",)  # in float; every other layer in half
 RENDERER = 4  # counts the changes that alter the frames
 
@@ -140,7 +145,7 @@ def write(
         if name in leave_out:
             continue
         kind = np.float32 if name in SINGLE else np.float16
-        for i, axis in enumerate(AXES.get(name, "RGB")):
+        for i, axis in enumerate(AXES.get(NUMBER.sub("", name), "RGB")):
             channels[f"{name}.{axis}"] = np.clip(picture[..., i], -largest, largest).astype(kind)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_channels(path, channels, json.dumps(facts))

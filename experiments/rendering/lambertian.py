@@ -39,9 +39,7 @@ def load_xml(path: Path, ball: Ball | None = None) -> tuple[Any, Camera]:
         make_lambertian(root)
         if ball:
             root.append(_ball(*ball))
-        resolver: Any = mi.file_resolver
-        resolver().prepend(str(path.resolve().parent))
-        scene = _load(ElementTree.tostring(root, "unicode"))
+        scene = load_text(path, root)
     except (ElementTree.ParseError, RuntimeError) as error:
         raise ValueError(
             f"Mitsuba cannot load {path}: {str(error).strip().splitlines()[-1]}"
@@ -66,12 +64,17 @@ def _ball(matrix: NDArray[np.float64], radius: float, name: str) -> Element:
     return shape
 
 
-def _load(text: str) -> Any:
-    """Mitsuba's loader waits for ever on a pool of one thread: lend it a second one."""
+def load_text(path: Path, root: Element, merged: bool = True) -> Any:
+    """The scene of `root`, which names its files as `path` does; shapes that go together `merged`.
+
+    Mitsuba's loader waits for ever on a pool of one thread: lend it a second one.
+    """
+    resolver: Any = mi.file_resolver
+    resolver().prepend(str(path.resolve().parent))
     threads = dr.thread_count()
     dr.set_thread_count(max(2, threads))
     try:
-        return mi.load_string(text)
+        return mi.load_string(ElementTree.tostring(root, "unicode"), optimize=merged)
     finally:
         dr.set_thread_count(threads)
 

@@ -7,9 +7,6 @@ only shifted; whole ones can follow, when it is known whether they are worth the
 docs/select.md derives the steps.
 """
 
-from __future__ import annotations
-
-import dataclasses
 import functools
 from typing import NamedTuple
 
@@ -19,24 +16,20 @@ import numpy as np
 
 from jflnr.auto.collected import Collected, inside
 from jflnr.auto.nested import fit_orders
-from jflnr.auto.weights import weigh, weighted
-from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, mean_light
+from jflnr.auto.weights import SETTINGS, weigh, weighted
+from jflnr.regression.adaptive import mean_light
 from jflnr.regression.energy import restore
-from jflnr.regression.level import Fit, Grid, mean_guides, predict, windowed
+from jflnr.regression.level import Fit, Grid, guide_features, mean_guides, predict, windowed
 from jflnr.regression.moments import index_xx, index_xy
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.multiscale import refine as refine_grid
+from jflnr.regression.resampling import double, halve
 from jflnr.regression.uncertainty import DETAIL, Error
-from jflnr.regression.widths import Known, guide_features
-from jflnr.regression.widths import refine as refine_grid
 from jflnr.regression.window import gather, window_over
 
 # Side in pixels of the coarsest blocks.
 COARSEST = 64
 # Windows of smaller blocks are so narrow that slopes across them are hardly worth their time.
 SLOPES = 16
-# Chosen on train and val. Blocks differ less from their pixels than pixels do, so weights may fall
-# more steeply with brightness than in adaptive FLR.
-SETTINGS = dataclasses.replace(DEFAULT, sigma=2.2, exponent=1.5, offset=0.1, brightness_scale=1.8)
 # Factor on what a group of guides explains of noise: the ridge has taken most of it already.
 ORDER_CAUTION = 0.2
 # Of what the guides do inside a block: how much is expected to be wrong, found on training frames.
@@ -48,7 +41,7 @@ class Models(NamedTuple):
 
     coefficients: `(Q + 1, C, h, w)`. means: `(Q + 1, h, w)`, of each block's guides. usable:
     `(h, w)`, how much of each block can be used. order: `(h, w)`, how many groups of guides they
-    use. width: `(h, w)`, how often the coarsest blocks were halved. level, error: `(h, w)`, the
+    use. width: `(h, w)`, how often the coarsest blocks were halved. luminance, error: `(h, w)`, the
     brightness and its expected squared error. share: `(h, w)`, how much of the last halving is
     signal. gains: `(G,)`, mean square of what each group of guides does inside blocks. mean: of the
     brightness. All in the unit of `Collected`.
@@ -59,7 +52,7 @@ class Models(NamedTuple):
     usable: jax.Array
     order: jax.Array
     width: jax.Array
-    level: jax.Array
+    luminance: jax.Array
     error: jax.Array
     share: jax.Array
     gains: jax.Array
@@ -78,7 +71,7 @@ class Progress(NamedTuple):
     merged: jax.Array
     order: jax.Array
     width: jax.Array
-    level: jax.Array
+    luminance: jax.Array
     error: Error
     share: jax.Array
 
@@ -98,18 +91,17 @@ def fit(collected: Collected, groups: tuple[int, ...], block: int) -> tuple[Mode
     Compiled once per size of the grid. groups: numbers of guides that enter together, in order.
     block: side in pixels of the blocks collected, a power of two below half of `COARSEST`.
     """
-    numbers = SETTINGS
     light = collected.light()
     mean = mean_light(jnp.sum(light[0]), jnp.sum(light[index_xy(0, 0, collected.shift.size, 1)]))
-    weights, squares = weigh(collected, light, mean, block, numbers)
+    weights, squares = weigh(collected, light, mean, block)
     finest = weighted(collected, weights, squares, block)
     grids = finest.pyramid((COARSEST // block).bit_length())
-    progress = _widest(grids.pop(), collected, groups, mean, numbers)
+    progress = _widest(grids.pop(), collected, groups, mean)
     for number, grid in enumerate(reversed(grids[1:]), 1):
-        progress = _refined(progress, grid, number, collected, groups, numbers)
+        progress = _refined(progress, grid, number, collected, groups)
     unfinished = Unfinished(weights, squares, progress)
-    progress = _refined(progress, finest, number + 1, collected, groups, numbers, shifted=True)
-    return _models(progress, halve(light), collected, groups, numbers), unfinished
+    progress = _refined(progress, finest, number + 1, collected, groups, shifted=True)
+    return _models(progress, halve(light), collected, groups), unfinished
 
 
 @functools.partial(jax.jit, static_argnames=("groups", "block"))
@@ -117,33 +109,30 @@ def refine(
     collected: Collected, unfinished: Unfinished, groups: tuple[int, ...], block: int
 ) -> Models:
     """Whole models of the blocks collected, from what `fit` left; arguments as there."""
-    numbers = SETTINGS
     grid = weighted(collected, unfinished.weights, unfinished.squares, block)
     number = (COARSEST // block).bit_length() - 1
-    progress = _refined(unfinished.progress, grid, number, collected, groups, numbers)
-    return _models(progress, halve(collected.light()), collected, groups, numbers)
+    progress = _refined(unfinished.progress, grid, number, collected, groups)
+    return _models(progress, halve(collected.light()), collected, groups)
 
 
 def _models(
-    progress: Progress,
-    light: jax.Array,
-    collected: Collected,
-    groups: tuple[int, ...],
-    numbers: AdaptiveFLR,
+    progress: Progress, light: jax.Array, collected: Collected, groups: tuple[int, ...]
 ) -> Models:
     """What the progress has come to. light: moments of the brightness, on twice larger blocks."""
     count = collected.shift.size
-    coefficients = restore(progress.merged, light, count, numbers.slack)
+    coefficients = restore(progress.merged, light, count, SETTINGS.slack)
     moments = collected.moments[: index_xy(0, 0, count, 0)]
     done = inside(coefficients, moments, groups)
-    error = progress.error.square() + DETAIL * progress.level**2 + INSIDE * jnp.sum(done, axis=0)
+    error = (
+        progress.error.square() + DETAIL * progress.luminance**2 + INSIDE * jnp.sum(done, axis=0)
+    )
     return Models(
         coefficients=coefficients,
         means=mean_guides(moments, count),
         usable=moments[0],
         order=progress.order,
         width=progress.width,
-        level=progress.level,
+        luminance=progress.luminance,
         error=error,
         share=progress.share,
         gains=jnp.sum(moments[0] * done, axis=(1, 2)) / jnp.maximum(jnp.sum(moments[0]), 1e-12),
@@ -151,21 +140,15 @@ def _models(
     )
 
 
-def _widest(
-    grid: Grid,
-    collected: Collected,
-    groups: tuple[int, ...],
-    mean: jax.Array,
-    numbers: AdaptiveFLR,
-) -> Progress:
+def _widest(grid: Grid, collected: Collected, groups: tuple[int, ...], mean: jax.Array) -> Progress:
     """The models of the coarsest grid."""
     count = collected.shift.size
-    features = guide_features(grid, count, numbers)
-    fit, order = _fit_grid(grid, features, collected, groups, mean, numbers)
-    level = predict(fit.coefficients, mean_guides(grid.moments, count))
+    features = guide_features(grid, count, SETTINGS)
+    fit, order = _fit_grid(grid, features, collected, groups, mean)
+    luminance = predict(fit.coefficients, mean_guides(grid.moments, count))
     zero, one = jnp.zeros_like(order), jnp.ones_like(order)
     merged = fit.coefficients
-    return Progress(mean, fit, merged, order, zero, level, Error.of(fit), one)
+    return Progress(mean, fit, merged, order, zero, luminance, Error.of(fit), one)
 
 
 def _refined(
@@ -174,7 +157,6 @@ def _refined(
     number: int,
     collected: Collected,
     groups: tuple[int, ...],
-    numbers: AdaptiveFLR,
     shifted: bool = False,
 ) -> Progress:
     """One grid finer: of its models, as much of the difference to the coarser ones as is signal.
@@ -186,38 +168,33 @@ def _refined(
     order, width = (double(planes, *size) for planes in (last.order, last.width))
     found = [order]
 
-    def own_fit(known: Known) -> Fit:
+    def own_fit(grid: Grid, features: jax.Array, coarse: Fit) -> Fit:
         if shifted:
-            return _shift_grid(grid, known, collected, numbers)
+            return _shift_grid(grid, features, coarse, collected)
         slopes = grid.block >= SLOPES
-        fine, found[0] = _fit_grid(grid, known.features, collected, groups, mean, numbers, slopes)
+        fine, found[0] = _fit_grid(grid, features, collected, groups, mean, slopes)
         return fine
 
-    step = refine_grid(grid, last.fit, last.merged, count, mean, numbers, own_fit)
+    step = refine_grid(grid, last.fit, last.merged, count, mean, SETTINGS, own_fit)
     return Progress(
         mean=mean,
         fit=step.fine,
         merged=step.merged,
         order=order + step.share * (found[0] - order),
         width=width + step.share * (number - width),
-        level=step.level,
+        luminance=step.luminance,
         error=last.error.after(step),
         share=step.share,
     )
 
 
-def _shift_grid(
-    grid: Grid,
-    known: Known,
-    collected: Collected,
-    numbers: AdaptiveFLR,
-) -> Fit:
+def _shift_grid(grid: Grid, features: jax.Array, coarse: Fit, collected: Collected) -> Fit:
     """The models of a coarser grid, each shifted by the mean of what it leaves under the window.
 
     Sums of a few planes instead of moments and a solve.
     """
     count, channels = collected.shift.size, collected.channels
-    window, coarse = window_over(known.features, numbers.sigma), known.coarse
+    window = window_over(features, SETTINGS.sigma)
     sums = grid.moments[np.array([index_xx(i, 0) for i in range(count + 1)])]
     light = grid.moments[index_xy(0, 0, count, channels) :][:channels]
     left = light - jnp.einsum("qchw,qhw->chw", coarse.coefficients, sums)
@@ -234,7 +211,6 @@ def _fit_grid(
     collected: Collected,
     groups: tuple[int, ...],
     mean: jax.Array,
-    numbers: AdaptiveFLR,
     slopes: bool = True,
 ) -> tuple[Fit, jax.Array]:
     """The models of one grid, all orders averaged, and how many groups are in them, `(h, w)`.
@@ -242,7 +218,7 @@ def _fit_grid(
     slopes: whether the position in the window is a last group of two guides.
     """
     shift, channels = collected.shift, collected.channels
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
+    system = windowed(grid, features, shift, channels, mean, SETTINGS, slopes=slopes)
     regular = system.eps, system.eps_prime
     noise = ORDER_CAUTION * system.variance
     all_groups = (*groups, 2) if slopes else groups

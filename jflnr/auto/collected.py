@@ -1,7 +1,5 @@
 """What a fit needs to know of a frame's pixels: one pass, and parts of what it brings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,7 +9,15 @@ import numpy as np
 
 from jflnr.regression.arguments import check_regression
 from jflnr.regression.level import brightness, mean_guides
-from jflnr.regression.moments import Guides, centre, collect, index_xx, index_xy, magnitude
+from jflnr.regression.moments import (
+    Guides,
+    centre,
+    channels_of,
+    collect,
+    index_xx,
+    index_xy,
+    unit_of,
+)
 
 
 class Collected(NamedTuple):
@@ -28,17 +34,7 @@ class Collected(NamedTuple):
 
     @property
     def channels(self) -> int:
-        count = self.shift.size + 1
-        return (self.moments.shape[0] - count * (count + 1) // 2) // count
-
-    def of_guides(self, kept: Sequence[int]) -> Collected:
-        """As if only these guides had been collected: a sub-matrix of the same moments."""
-        rows = [0, *(q + 1 for q in kept)]
-        planes = [index_xx(i, j) for n, i in enumerate(rows) for j in rows[: n + 1]]
-        count, channels = self.shift.size, self.channels
-        planes += [index_xy(i, c, count, channels) for i in rows for c in range(channels)]
-        shift = self.shift[np.array(kept, int)]
-        return self._replace(moments=self.moments[np.array(planes)], shift=shift)
+        return channels_of(self.moments, self.shift.size)
 
     def light(self) -> jax.Array:
         """Moments of the brightness alone."""
@@ -60,7 +56,7 @@ def collect_frame(
     """
     check_regression(target, guides, None, weight)
     shift = centre(guides)
-    unit = magnitude(target)
+    unit = unit_of(target)
     channels = target.shape[-1]
     weights = brightness(channels, unit.dtype) / unit
     planes = collect(target, guides, shift, block, weight, weights)

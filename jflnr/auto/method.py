@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jflnr.auto import plan as plans
-from jflnr.auto.blocks import SETTINGS, Models, Unfinished, fit, refine
+from jflnr.auto.blocks import Models, Unfinished, fit, refine
 from jflnr.auto.collected import Collected, collect_frame, hold
-from jflnr.auto.glance import is_simple
+from jflnr.auto.complexity import is_simple
+from jflnr.auto.weights import SETTINGS
 from jflnr.checks import one_sentence
 from jflnr.frame import Array, Frame
 from jflnr.images import guides as guide_layers
@@ -27,7 +28,7 @@ from jflnr.regression.adaptive import light_of
 from jflnr.regression.apply import apply
 from jflnr.regression.energy import rescale
 from jflnr.regression.floor import with_own_light
-from jflnr.stages import regress
+from jflnr.stages import on_frame
 
 
 @jax.tree_util.register_dataclass
@@ -70,18 +71,13 @@ class Auto:
         plan, fitted = _planned(frame, names, limits)
         if plan.form not in plans.BLOCKS:
             method = method_of(plan.form, keep_energy=self.keep_energy).for_frame(frame, names)
-            return plan, _regress(method, frame, names)
+            return plan, on_frame(method, frame, names)["image"]
         if plans.COLLECTED[plan.form] != fitted.block:
             fitted = _fitted(frame, names, plan.form)
         models = _finished(fitted, plan.form)
         plan = dataclasses.replace(plan, guides=plans.worth_reading(models, names))
         used = tuple(names.index(name) for name in plan.guides)
-        return plan, _image(fitted, models, plan.form, used, self.keep_energy)
-
-
-@functools.partial(jax.jit, static_argnames="names")
-def _regress(method: Any, frame: Frame, names: tuple[str, ...]) -> jax.Array:
-    return regress(method, method.images(frame, names))["image"]
+        return plan, _image(fitted, models, used, self.keep_energy)
 
 
 @one_sentence
@@ -111,33 +107,32 @@ def plan_of(frame: Frame, guides: Sequence[str] | None = None) -> plans.Plan:
     return _planned(_on_device(inputs), names, limits)[0]
 
 
-def denoise_on_blocks(
-    frame: Frame, form: str, guides: Sequence[str] | None = None
-) -> tuple[Array, Models]:
+def denoise_on_blocks(frame: Frame, form: str) -> tuple[Array, Models]:
     """One of the forms of `BLOCKS` by itself, with all guides: its light, and the models.
 
-    frame, guides: as of `denoise`. The errors of the models are in the unit of the light.
+    frame: as of `denoise`. The errors of the models are in the unit of the light.
     """
-    names, inputs = prepare(frame, guides, Auto())
+    names, inputs = prepare(frame, None, Auto())
     fitted = _fitted(_on_device(inputs), names, form)
     models = _finished(fitted, form)
-    image = _image(fitted, models, form, tuple(range(len(names))), False)
+    image = _image(fitted, models, tuple(range(len(names))))
     return image, models._replace(error=models.error * fitted.collected.unit**2)
 
 
-@dataclasses.dataclass(frozen=True)
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class Fitted:
     """A frame on the device, its ambient occlusion without noise if models follow that closely,
     its moments on blocks of so many pixels, and models."""
 
     frame: Frame
-    names: tuple[str, ...]
     scene: guide_layers.Scene
     collected: Collected
     models: Models
     unfinished: Unfinished
-    groups: tuple[int, ...]
-    block: int
+    names: tuple[str, ...] = field(metadata={"static": True})
+    groups: tuple[int, ...] = field(metadata={"static": True})
+    block: int = field(metadata={"static": True})
 
 
 _on_device = functools.partial(jax.tree.map, jnp.asarray)
@@ -150,10 +145,10 @@ def _planned(
     pixels = frame.depth.size
     first = plans.first(bool(is_simple(frame)), limits, pixels)
     fitted = _fitted(frame, names, first)
-    look = plans.look_at(fitted.models)
+    statistics = plans.statistics_of(fitted.models)
     network = set(names) in (set(NEEDED), set(GUIDES)) and frame.indirect.shape[-1] % 3 == 0
     order = np.asarray(fitted.models.order)
-    return plans.plan(first, look, names, order, pixels, limits, network), fitted
+    return plans.plan(first, statistics, names, order, pixels, limits, network), fitted
 
 
 def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
@@ -163,7 +158,7 @@ def _fitted(frame: Frame, names: tuple[str, ...], form: str) -> Fitted:
     frame = dataclasses.replace(frame, ao=frame.ao if ao is None else ao)
     groups = tuple(getattr(frame, name).shape[-1] for name in names)
     models, unfinished = fit(collected, groups, block)
-    return Fitted(frame, names, scene, collected, models, unfinished, groups, block)
+    return Fitted(frame, scene, collected, models, unfinished, names, groups, block)
 
 
 def _finished(fitted: Fitted, form: str) -> Models:
@@ -171,16 +166,6 @@ def _finished(fitted: Fitted, form: str) -> Models:
     if form == plans.start_of(form):
         return fitted.models
     return refine(fitted.collected, fitted.unfinished, fitted.groups, fitted.block)
-
-
-def _image(
-    fitted: Fitted, models: Models, form: str, used: tuple[int, ...], keep_energy: bool
-) -> Array:
-    collected, block = fitted.collected, plans.COLLECTED[form]
-    light = collected.shift, collected.unit
-    return _apply(
-        fitted.frame, fitted.scene, models, *light, fitted.names, used, block, keep_energy
-    )
 
 
 @functools.partial(jax.jit, static_argnames=("names", "block"))
@@ -192,22 +177,11 @@ def _collect(
     No layer of the frame itself: a program that returned one would copy it.
     """
     scene = guide_layers.scene_of(frame)
-    images = _images(frame, names, block, scene)
+    prepared = robust_images if _is_fine(block) else plain_images
+    images = prepared(frame, names, scene, smooth_guide)
     collected = collect_frame(images["target"], images["guides"], block, images["weight"])
     smoothed = "ao" in names and _is_fine(block)
     return scene, images["guides"][names.index("ao")] if smoothed else None, collected
-
-
-def _images(
-    frame: Frame,
-    names: tuple[str, ...],
-    block: int,
-    scene: guide_layers.Scene,
-    smooth: Callable[..., Array] = smooth_guide,
-) -> dict[str, Any]:
-    if _is_fine(block):
-        return robust_images(frame, names, scene, smooth)
-    return plain_images(frame, names, scene)
 
 
 def _is_fine(block: int) -> bool:
@@ -216,29 +190,23 @@ def _is_fine(block: int) -> bool:
     return block < 8
 
 
-@functools.partial(jax.jit, static_argnames=("names", "used", "block", "keep_energy"))
-def _apply(
-    frame: Frame,
-    scene: guide_layers.Scene,
-    models: Models,
-    shift: jax.Array,
-    unit: jax.Array,
-    names: tuple[str, ...],
-    used: tuple[int, ...],
-    block: int,
-    keep_energy: bool,
+@functools.partial(jax.jit, static_argnames=("used", "keep_energy"))
+def _image(
+    fitted: Fitted, models: Models, used: tuple[int, ...], keep_energy: bool = False
 ) -> jax.Array:
     """Evaluate the models at every pixel, reading the guides `used` only."""
-    images = _images(frame, names, block, scene, lambda ao, *_: ao)
+    block, collected = fitted.block, fitted.collected
+    prepared = robust_images if _is_fine(block) else plain_images
+    images = prepared(fitted.frame, fitted.names, fitted.scene, lambda ao, *_: ao)
     target, layers = images["target"], images["guides"]
     ends = np.cumsum([layer.shape[-1] for layer in layers])
     kept = [int(q) for n in used for q in range(ends[n] - layers[n].shape[-1], ends[n])]
     held = hold(models.coefficients, models.means, kept)
     guides = (*(layers[n] for n in used), jnp.zeros((*target.shape[:2], 0), held.dtype))
-    shift = shift[np.array(kept, int)]
+    shift = collected.shift[np.array(kept, int)]
     if _is_fine(block):
         held = with_own_light(held, models.means[np.array([0, *(q + 1 for q in kept)])])
-        image = apply(held, guides, shift, block, SETTINGS.floor) * unit
+        image = apply(held, guides, shift, block, SETTINGS.floor) * collected.unit
     else:
-        image = apply(held * unit, guides, shift, block)
+        image = apply(held * collected.unit, guides, shift, block)
     return rescale(image, light_of(target), images["weight"]) if keep_energy else image

@@ -7,8 +7,6 @@ the fit is known as soon as it is taken in, whatever comes later: with z = L^-1 
 by group is the average of these models (Hansen, Least squares model averaging, 2007).
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -20,7 +18,7 @@ import numpy as np
 from jflnr.regression.division import divide
 from jflnr.regression.elimination import factor, substitute
 from jflnr.regression.level import brightness
-from jflnr.regression.solve import ROUNDING_OF_STRIPS, STRIP, normal_equations
+from jflnr.regression.solve import ROUNDING_OF_STRIPS, normal_equations
 from jflnr.regression.strips import map_rows
 
 
@@ -55,7 +53,7 @@ def fit_orders(
     brightness. groups: numbers of guides that enter together, in order; their sum is Q.
     """
     fit = functools.partial(_fit, shift=shift, groups=tuple(groups), channels=channels)
-    return map_rows(fit, (moments, *regular, noise), STRIP)
+    return map_rows(fit, (moments, *regular, noise))
 
 
 def _fit(

@@ -1,7 +1,5 @@
 """What to denoise a frame with: what is predicted of each form, and the smallest that is enough."""
 
-from __future__ import annotations
-
 import functools
 import time
 from collections.abc import Mapping, Sequence
@@ -42,7 +40,7 @@ class Limits(NamedTuple):
     seconds: float | None = None
 
 
-class Look(NamedTuple):
+class Statistics(NamedTuple):
     """A frame as the form that is tried first sees it; the arguments of the predictions.
 
     decibels: PSNR that the expected error leaves. share: of the finest step that is signal.
@@ -112,33 +110,27 @@ class Plan:
         ]
 
 
-def look_at(models: Models) -> Look:
+def statistics_of(models: Models) -> Statistics:
     """Numbers of one frame from the models of its blocks."""
-    level, error, share, order, width = (
+    luminance, error, share, order, width = (
         np.asarray(planes, np.float64)
-        for planes in (models.level, models.error, models.share, models.order, models.width)
+        for planes in (models.luminance, models.error, models.share, models.order, models.width)
     )
     used = np.asarray(models.usable) > 0
     used = used if used.any() else np.ones_like(used)
     mean = float(models.mean)
     scale = MEAN_BRIGHTNESS / mean
-    shown = np.clip(scale * level, 1e-2, 1)
-    slope = np.where(scale * level < 1, scale / GAMMA * shown ** (1 / GAMMA - 1), 0)
+    shown = np.clip(scale * luminance, 1e-2, 1)
+    slope = np.where(scale * luminance < 1, scale / GAMMA * shown ** (1 / GAMMA - 1), 0)
     displayed = max(float(np.mean((error * slope**2)[used])), 1e-9)
-    relative = error / (level**2 + 0.01 * mean**2)
-    return Look(
+    relative = error / (luminance**2 + 0.01 * mean**2)
+    return Statistics(
         decibels=-10 * float(np.log10(displayed)),
         share=float(np.mean(share[used])),
         noise=float(np.mean(np.log10(np.maximum(relative[used], 1e-9)))),
         order=float(np.mean(order[used])),
         width=float(np.mean(width[used])),
     )
-
-
-def predict(look: Look, first: str) -> dict[str, float]:
-    """PSNR that the form which looked and those larger are expected to reach."""
-    values = np.array([1, *look])
-    return {form: float(values @ np.array(w)) for form, w in PREDICTIONS[first].items()}
 
 
 def worth_reading(models: Models, names: Sequence[str]) -> tuple[str, ...]:
@@ -165,7 +157,7 @@ def first(simple: bool, limits: Limits, pixels: int) -> str:
 
 def plan(
     first: str,
-    look: Look,
+    statistics: Statistics,
     names: tuple[str, ...],
     order: np.ndarray,
     pixels: int,
@@ -176,7 +168,8 @@ def plan(
 
     order: `(h, w)`, of the blocks of that form. network: whether flnr can be used.
     """
-    decibels = predict(look, first)
+    values = np.array([1, *statistics])
+    decibels = {form: float(values @ np.array(w)) for form, w in PREDICTIONS[first].items()}
     if not network:
         del decibels["flnr"]
     cost = {
@@ -185,43 +178,36 @@ def plan(
     ms = None
     if limits.seconds is not None:
         ms = {form: 1e3 * limits.seconds * pixels * c for form, c in cost.items()}
-    form = choose(_open(first, decibels, limits), cost, ms, limits.budget_ms, limits.target_db)
+    form = choose(first, decibels, cost, ms, limits)
     time = None if ms is None else ms[form]
     return Plan(form, names, decibels, cost, time, order, COLLECTED[first], len(names))
 
 
-def _open(first: str, decibels: Mapping[str, float], limits: Limits) -> dict[str, float]:
-    """The forms that may be taken. With no other wish than the smallest model that is enough, a
-    simple frame stays with the form for such, and none goes on to the network: which frames gain by
-    it cannot be predicted (docs/select.md)."""
-    if limits.target_db is not None or limits.budget_ms is not None:
-        return dict(decibels)
-    small = BLOCKS[:1] if first == FORMS[0] else BLOCKS[1:]
-    return {form: value for form, value in decibels.items() if form in small}
-
-
 def choose(
+    first: str,
     decibels: Mapping[str, float],
     cost: Mapping[str, float],
     milliseconds: Mapping[str, float] | None,
-    budget_ms: float | None,
-    target_db: float | None,
+    limits: Limits,
 ) -> str:
     """The form to take, out of those in `decibels`, from the cheapest to the dearest.
 
     With a target the cheapest form that is expected to reach it, or else the best. With a budget
     none that is expected to take longer, unless all do: then the cheapest. With neither, the one
-    whose last decibel is worth its time (PRICE).
+    whose last decibel is worth its time (PRICE): a simple frame stays with the form for such, which
+    has looked first, and none goes on to the network, as which frames gain by it cannot be
+    predicted (docs/select.md).
     """
     forms = list(decibels)
-    if budget_ms is not None and milliseconds is not None:
-        forms = [form for form in forms if milliseconds[form] <= budget_ms] or forms[:1]
+    if limits.budget_ms is not None and milliseconds is not None:
+        forms = [form for form in forms if milliseconds[form] <= limits.budget_ms] or forms[:1]
     best = max(forms, key=lambda form: decibels[form])
-    if target_db is not None:
-        return next((form for form in forms if decibels[form] >= target_db), best)
-    if budget_ms is not None:
+    if limits.target_db is not None:
+        return next((form for form in forms if decibels[form] >= limits.target_db), best)
+    if limits.budget_ms is not None:
         return best
-    return max(forms, key=lambda form: decibels[form] - PRICE * cost[form])
+    small = BLOCKS[:1] if first == BLOCKS[0] else BLOCKS[1:]
+    return max(small, key=lambda form: decibels[form] - PRICE * cost[form])
 
 
 @functools.cache

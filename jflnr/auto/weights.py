@@ -1,28 +1,26 @@
 """What every block counts: one over the variance that a first fit expects of its light."""
 
-from __future__ import annotations
+import dataclasses
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jflnr.auto.collected import Collected
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.level import Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.adaptive import DEFAULT
+from jflnr.regression.level import Grid, fit_level, mean_guides, predict
 from jflnr.regression.moments import index_xx
-from jflnr.regression.pyramid import double, halve
-from jflnr.regression.widths import guide_features
+from jflnr.regression.resampling import double, halve
 
+# Chosen on train and val. Blocks differ less from their pixels than pixels do, so weights may fall
+# more steeply with brightness than in adaptive FLR.
+SETTINGS = dataclasses.replace(DEFAULT, sigma=2.2, exponent=1.5, offset=0.1, brightness_scale=1.8)
 # Side in pixels of the blocks of the first fit.
 FIRST = 16
 
 
 def weigh(
-    collected: Collected,
-    light: jax.Array,
-    mean: jax.Array,
-    block: int,
-    numbers: AdaptiveFLR,
+    collected: Collected, light: jax.Array, mean: jax.Array, block: int
 ) -> tuple[jax.Array, jax.Array]:
     """Weights `(h, w)` of the blocks, and the mean squares `(1, h, w)` of what the fit leaves.
 
@@ -30,12 +28,12 @@ def weigh(
     blocks of `collected`.
     """
     count = collected.shift.size
-    pilot = _first_fit(light, collected.shift, mean, block, numbers)
-    level = predict(pilot, mean_guides(light, count))
+    pilot = _first_fit(light, collected.shift, mean, block)
+    luminance = predict(pilot, mean_guides(light, count))
     squares = squared_residual(light, collected.squares, pilot[:, 0])
-    # The floor is there for the derivative of the power at 0.
-    relative = jnp.maximum(level / mean, 1e-6)
-    return 1 / (relative**numbers.exponent + numbers.offset), squares[None]
+    # The bound is there for the derivative of the power at 0.
+    relative = jnp.maximum(luminance / mean, 1e-6)
+    return 1 / (relative**SETTINGS.exponent + SETTINGS.offset), squares[None]
 
 
 def weighted(collected: Collected, weights: jax.Array, squares: jax.Array, block: int) -> Grid:
@@ -43,18 +41,14 @@ def weighted(collected: Collected, weights: jax.Array, squares: jax.Array, block
     return Grid(collected.moments * weights, squares * weights**2, block)
 
 
-def _first_fit(
-    light: jax.Array, shift: jax.Array, mean: jax.Array, block: int, numbers: AdaptiveFLR
-) -> jax.Array:
+def _first_fit(light: jax.Array, shift: jax.Array, mean: jax.Array, block: int) -> jax.Array:
     """Models of the brightness under wide windows, on the blocks of `light`."""
     sizes = [light.shape[1:]]
     while block < FIRST:
         light, block = halve(light), 2 * block
         sizes.append(light.shape[1:])
     grid = Grid(light, jnp.zeros_like(light[:1]), block)
-    features = guide_features(grid, shift.size, numbers)
-    models = fit_level(windowed(grid, features, shift, 1, mean, numbers), shift.size, 1)
-    coefficients = models.coefficients
+    coefficients = fit_level(grid, shift, 1, mean, SETTINGS).coefficients
     for size in reversed(sizes[:-1]):
         coefficients = double(coefficients, *size)
     return coefficients

@@ -1,7 +1,5 @@
 """Blockwise multi-order feature regression: phase II of BMFR (Koskela et al. 2019, section 3.3)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax
@@ -10,7 +8,7 @@ import numpy as np
 
 from jflnr.frame import Array
 from jflnr.regression.division import divide
-from jflnr.regression.moments import magnitude
+from jflnr.regression.moments import unit_of
 
 # Displacements of the grid, in blocks: a sequence of 16 (section 6.1), here spread evenly.
 OFFSETS = np.arange(16)[:, None] * np.array([0.7548776662466927, 0.5698402909980532]) % 1
@@ -62,7 +60,7 @@ def fit(
     )
     surface = surface & jnp.all(jnp.isfinite(features), axis=-1, keepdims=True)
     # Sums over a block of light near the type's maximum must not overflow.
-    unit = jnp.maximum(magnitude(jnp.asarray(light)), 1)
+    unit = jnp.maximum(unit_of(jnp.asarray(light)), 1)
     there, z = cut(surface), cut(light / unit)
     t = scaled_features(cut(features), there, squares)
     used = there & jnp.all(jnp.isfinite(z), axis=-1, keepdims=True)

@@ -40,7 +40,6 @@ class BMFR:
     """
 
     name: ClassVar[str] = "bmfr"
-    backends: ClassVar[tuple[str, ...]] = ("jax", "opencl")
     features: ClassVar[tuple[str, ...]] = ("normal", "position")
 
     noise: jax.Array | float = 0.01

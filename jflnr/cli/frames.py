@@ -203,7 +203,7 @@ class Worker:
             rows = profile(default_context(), lambda: denoise_frame(frame))
             record["profile"] = [row._asdict() for row in rows]
         if arguments.explain:
-            from jflnr.cli.explain import explain
+            from jflnr.cli.pictures import explain
 
             record["plan"] = explain(job.explanation, frame, self.settings["guides"])
         if arguments.reference:
@@ -216,15 +216,28 @@ class Worker:
         given = denoiser(frame)
         if not isinstance(given, tuple):
             return {"image": given}
-        method = denoiser.method_for(frame)
-        names = [name for name, _ in method.stages()[-1].gives]
+        names = denoiser.method_for(frame).stages()[-1].names
         return dict(zip(names, given, strict=True))
 
     def _write(self, done: Denoised) -> Record:
-        start = time.perf_counter()
-        _write(done, self.arguments)
+        """Write what is not there: the EXR, with the input's header and window, the preview."""
+        from jflnr import exr
+        from jflnr.cli.pictures import write_preview
+        from jflnr.metrics import exposure
+
+        start, arguments = time.perf_counter(), self.arguments
+        job, source, frame, result, about, record = done
+        missing = lambda path: arguments.overwrite or not path.exists()
+        if missing(job.target):
+            channels = channels_of(source, frame, result, arguments)
+            comments = json.dumps(source.header | {"denoiser": about})
+            window, others = source.attributes.window, source.attributes.others
+            exr.write_channels(job.target, channels, comments, window, others)
+        if arguments.png and missing(job.preview):
+            # The sky or a lamp in view would darken the room, so what is lit sets the brightness.
+            write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))
         self.exr_seconds["write"] += time.perf_counter() - start
-        return _record(done.job) | {"status": "written"} | done.record
+        return _record(job) | {"status": "written"} | record
 
 
 def failure(job: Job, error: BaseException) -> Record:
@@ -237,21 +250,3 @@ def failure(job: Job, error: BaseException) -> Record:
 
 def _record(job: Job) -> Record:
     return {"input": str(job.source), "output": str(job.target)}
-
-
-def _write(done: Denoised, arguments: argparse.Namespace) -> None:
-    """Write what is not there: the EXR, with the input's header and windows, then the preview."""
-    from jflnr import exr
-    from jflnr.cli.preview import write_preview
-    from jflnr.metrics import exposure
-
-    job, source, frame, result, about, _ = done
-    missing = lambda path: arguments.overwrite or not path.exists()
-    channels = channels_of(source, frame, result, arguments)
-    comments = json.dumps(source.header | {"denoiser": about})
-    attributes = source.attributes
-    if missing(job.target):
-        exr.write_channels(job.target, channels, comments, attributes.window, attributes.others)
-    if arguments.png and missing(job.preview):
-        # The sky or a lamp in view would darken the room: the brightness is set on reflected light.
-        write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))

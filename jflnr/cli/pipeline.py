@@ -1,8 +1,5 @@
 """Frames one after another, the next being read and the last being written meanwhile."""
 
-from __future__ import annotations
-
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
@@ -19,21 +16,17 @@ def pipelined(
 
     `work` runs here, the others on a thread of their own each; at most three jobs are under way.
     """
-    waiting = iter(jobs)
-    reads: deque[Future] = deque()
-    writes: deque[Future] = deque()
+    waiting, reads, writes = iter(jobs), list[Future](), list[Future]()
     with ThreadPoolExecutor(1) as reader, ThreadPoolExecutor(1) as writer:
+        coming = lambda: [reader.submit(read, job) for job in islice(waiting, 1)]
         try:
-            reads.extend(reader.submit(read, job) for job in islice(waiting, 1))
+            reads = coming()
             while reads:
-                found = reads.popleft().result()
-                reads.extend(reader.submit(read, job) for job in islice(waiting, 1))
+                found, reads = reads[0].result(), coming()
                 done = work(found)
-                while writes:
-                    yield writes.popleft().result()
-                writes.append(writer.submit(write, done))
-            while writes:
-                yield writes.popleft().result()
+                yield from (writing.result() for writing in writes)
+                writes = [writer.submit(write, done)]
+            yield from (writing.result() for writing in writes)
         finally:
             for future in (*reads, *writes):
                 future.cancel()

@@ -40,7 +40,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "method": method_of(method, **options),
         "backend": arguments.backend,
-        "guides": _guides(about) if arguments.guides is None else arguments.guides,
+        "guides": about.get("guides") if arguments.guides is None else arguments.guides,
     }
 
 
@@ -62,11 +62,3 @@ def _load(arguments: argparse.Namespace, method: Any) -> tuple[Any, dict[str, An
             f"{method.name}; `jflnr fit --method {method.name}` makes what is needed"
         )
     return fitted, about
-
-
-def _guides(about: dict[str, Any]) -> list[str] | None:
-    """The guides that a parameter file names, if it does."""
-    guides = about.get("guides")
-    if guides is None or (isinstance(guides, list) and all(isinstance(g, str) for g in guides)):
-        return guides
-    raise ValueError(f"--params: its guides must be a list of names; got {guides!r}")

@@ -11,7 +11,7 @@ import dataclasses
 import itertools
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,7 +96,8 @@ class ShotDenoiser:
                 "delete it, and the shot starts from its first frame"
             )
         last = max((i + 1 for i, there in enumerate(kept) if not there), default=done)
-        running = _Running(self.worker, self.history, before)
+        header = {} if before is None else before.about["header"]
+        running = _Running(self.worker, self.history, before, header)
         yield from (record for record in kept[:done] if record)
         yield from pipelined(shot[done:last], running.read, running.denoise, running.write)
         yield from (record for record in kept[last:] if record)
@@ -125,13 +126,9 @@ class _Running:
     worker: Worker
     history: Path | None
     before: History | None
+    header: dict[str, Any]
     state: Any = None
-    header: dict[str, Any] = field(default_factory=dict)
     failed: bool = False
-
-    def __post_init__(self) -> None:
-        if self.before is not None:
-            self.header = self.before.about["header"]
 
     def read(self, job: Job) -> Loaded | Record:
         """The frame, with motion from the cameras if it has none of its own."""

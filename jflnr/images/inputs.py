@@ -1,7 +1,5 @@
 """The images that a regression takes: the light, the guides, and which pixels count."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 from collections.abc import Callable, Sequence
@@ -13,9 +11,7 @@ from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images import guides as guide_layers
 from jflnr.images.noisy_guides import smooth_guide
-
-# Of the layers that do not have three; None for any number.
-CHANNELS = {"depth": 1, "ao": 1, "mask": 1, "alpha": 1, "lobes": None, "lobe_colours": None}
+from jflnr.layouts import LAYERS, PICTURE
 
 
 def prepare(
@@ -69,7 +65,7 @@ def _check_sizes(frame: Frame) -> None:
     layers = {"normal": frame.normal, "depth": frame.depth} | frame.layers()
     layers.pop("indirect", None)
     for name, layer in layers.items():
-        checks.image(name, layer, CHANNELS.get(name, 3))
+        checks.image(name, layer, len((LAYERS | PICTURE)[name]) or None)
     checks.same_size(**layers)
     checks.image("indirect", frame.indirect)
     (height, width), (h, w) = frame.normal.shape[:2], frame.indirect.shape[:2]

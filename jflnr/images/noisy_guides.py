@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from jflnr.lazy import jax, jnp
+from jflnr.lazy import jax, jnp, lax
 
 # How far neighbours may differ, one standard deviation: normals, and depth as a share of itself.
 NORMAL, DEPTH = 0.25, 0.02
@@ -31,26 +31,16 @@ def _smooth(guide: jax.Array, normal: jax.Array, depth: jax.Array, axis: int) ->
     size = guide.shape[axis]
     difference = jnp.nan_to_num(jnp.diff(guide, axis=axis) * weight, posinf=0, neginf=0)
     margin = [(1, 1) if a == axis else (0, 0) for a in range(3)]
-    difference, weight = jnp.pad(difference, margin), jnp.pad(weight, margin)
-
-    def after(a: jax.Array) -> jax.Array:
-        return jax.lax.slice_in_dim(a, 1, size + 1, axis=axis)
-
-    def before(a: jax.Array) -> jax.Array:
-        return jax.lax.slice_in_dim(a, 0, size, axis=axis)
-
-    change = after(difference) - before(difference)
-    return guide + change / (1 + after(weight) + before(weight))
+    change, weight = jnp.diff(jnp.pad(difference, margin), axis=axis), jnp.pad(weight, margin)
+    after, before = (lax.slice_in_dim(weight, k, k + size, axis=axis) for k in (1, 0))
+    return guide + change / (1 + after + before)
 
 
 def _likeness(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
     """How alike each pixel and the next are, between 0 and 1, one fewer along `axis`; 0 for NaN."""
     size = depth.shape[axis]
     turn = jnp.sum(jnp.diff(normal, axis=axis) ** 2, axis=-1, keepdims=True)
-    nearer = jnp.minimum(
-        jax.lax.slice_in_dim(depth, 0, size - 1, axis=axis),
-        jax.lax.slice_in_dim(depth, 1, size, axis=axis),
-    )
+    nearer = jnp.minimum(*(lax.slice_in_dim(depth, k, k + size - 1, axis=axis) for k in (0, 1)))
     step = jnp.diff(depth, axis=axis) / (DEPTH * nearer + 1e-6)
     return jnp.nan_to_num(jnp.exp(-(turn / NORMAL**2 + step**2) / 2))
 

@@ -1,7 +1,5 @@
 """How much memory a frame may take, and how large the pieces may then be."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import re

@@ -3,8 +3,6 @@
 OpenEXR's own Python module only knows whole files. Files of one part in scan lines can be read so.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Collection, Mapping

@@ -1,7 +1,5 @@
 """A frame of which a few rows at a time are had."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass

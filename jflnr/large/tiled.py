@@ -4,8 +4,6 @@ Stages that read pixels run on strips of whole rows, the others on tiles of bloc
 on with as much around it as the stage says that it looks at, so that the result is the whole's.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math
@@ -71,11 +69,8 @@ class Job:
     def run(self, stage: Stage, rows: Piece, columns: Piece) -> Parts:
         """What a stage gives for one part with all around it."""
         parts = {name: self._read(self.kept[name], rows, columns) for name in stage.reads}
-        if not stage.pixels:
-            return _on_blocks(stage, self.method, parts, self.known)
-        frame = self.rows.read(rows.low, rows.high)
-        images = self.names, self.scene
-        return _on_pixels(stage, self.method, frame, *images, parts, self.known)
+        frame = self.rows.read(rows.low, rows.high) if stage.pixels else None
+        return _run(stage, self.method, frame, self.names, self.scene, parts, self.known)
 
     def _read(self, kept: Kept, rows: Piece, columns: Piece) -> Any:
         rows, columns = rows.on(kept.side), columns.on(kept.side)
@@ -107,7 +102,7 @@ def strips(
             _complete(job, stage)
         for y, x in job.places(last):
             given = job.run(last, y, x)
-            yield y.start, {name: np.asarray(given[name])[y.kept] for name, _ in last.gives}
+            yield y.start, {name: np.asarray(given[name])[y.kept] for name in last.names}
 
 
 def _complete(job: Job, stage: Stage) -> None:
@@ -166,19 +161,16 @@ def _images(method: Any, frame: Frame, names: tuple[str, ...], scene: Scene) -> 
     return method.images(frame, names, scene)
 
 
-@functools.partial(jax.jit, static_argnames="stage")
-def _on_blocks(stage: Stage, method: Any, parts: Parts, known: Known) -> Parts:
-    return stage.run(method, parts, known)
-
-
 @functools.partial(jax.jit, static_argnames=("stage", "names"))
-def _on_pixels(
+def _run(
     stage: Stage,
     method: Any,
-    frame: Frame,
+    frame: Frame | None,
     names: tuple[str, ...],
     scene: Scene,
     parts: Parts,
     known: Known,
 ) -> Parts:
-    return stage.run(method, method.images(frame, names, scene) | parts, known)
+    """frame: None for a stage that reads no pixels."""
+    images = {} if frame is None else method.images(frame, names, scene)
+    return stage.run(method, images | parts, known)

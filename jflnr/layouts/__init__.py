@@ -10,21 +10,3 @@ from jflnr.layouts.channels import LAYERS, PICTURE, Layout, layer
 from jflnr.layouts.output import CHOICES, output_channels, pass_names
 from jflnr.layouts.source import Source, is_picture, load, picture, samples
 from jflnr.layouts.surface import denoised
-
-__all__ = [
-    "CHOICES",
-    "LAYERS",
-    "PICTURE",
-    "Layout",
-    "Source",
-    "assemble",
-    "denoised",
-    "is_picture",
-    "layer",
-    "load",
-    "native",
-    "output_channels",
-    "pass_names",
-    "picture",
-    "samples",
-]

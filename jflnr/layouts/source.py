@@ -77,6 +77,8 @@ def recognise(
 
 def samples(source: Source) -> int | None:
     """Samples per pixel of another program's picture, if its header says so."""
+    if source.layout.program == "jflnr" and "beauty" in source.layout.channels:
+        return int(source.layout.channels["beauty"][0].removeprefix("beauty_").removesuffix(".R"))
     for name, value in source.attributes.others.items():
         if name == "samplesPerPixel" or re.fullmatch(r"cycles\..*\.samples", name):
             return int(value) if str(value).isdigit() else None

@@ -1,7 +1,5 @@
 """Adam (Kingma and Ba 2015), with an average of the weights."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

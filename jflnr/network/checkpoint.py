@@ -1,7 +1,5 @@
 """The state of a training run in a file, from which it goes on as if nothing had happened."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Training examples: crops of frames under ever other noise, with all that precedes the network."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import re
@@ -28,7 +26,7 @@ SHARES = {4: 0.5, 16: 0.25, 1 << 30: 0.25}
 # Share of the fits that have occlusion among their guides: files of other programs have none.
 OCCLUDED = 0.8
 # Squared error as displayed below which a picture is as good as its target.
-FLOOR = 3e-4
+LEAST_ERROR = 3e-4
 # A crop that shows little but sky teaches little.
 LEAST_SURFACE, TRIES = 0.3, 5
 # Change it when prepared frames become others.
@@ -137,7 +135,7 @@ def _record(
     found |= {name: np.asarray(fields[name], np.float16) for name in OF_NOISE}
     found |= {"spp": np.array(fields["spp"]), "occluded": np.array(fields["occluded"])}
     found |= {"exposure": np.array(fields["exposure"], np.float32)}
-    found |= {"own": np.maximum(own, FLOOR).astype(np.float32), "group": groups}
+    found |= {"own": np.maximum(own, LEAST_ERROR).astype(np.float32), "group": groups}
     record = np.zeros(1, [(name, value.dtype, value.shape) for name, value in found.items()])
     for name, value in found.items():
         record[name][0] = value

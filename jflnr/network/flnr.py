@@ -21,10 +21,10 @@ from jflnr.images.noisy_guides import smooth_guide
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
 from jflnr.regression import adaptive
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.arguments import channel_count, check_regression, layers_of
+from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
+from jflnr.regression.arguments import layers_of
 from jflnr.regression.moments import Guides
-from jflnr.stages import Known, Parts, Stage, regress
+from jflnr.stages import Known, Parts, Stage
 
 # Guides that the network was trained with: normal (3), depth and, where a frame has it, occlusion.
 NEEDED, GUIDES = ("normal", "depth"), ("normal", "depth", "ao")
@@ -92,13 +92,12 @@ class FLNR(AdaptiveFLR):
     def stages(self) -> tuple[Stage, ...]:
         side = self.finest
         *before, fits, _ = AdaptiveFLR.stages(dataclasses.replace(self, keep_energy=False))
-        given = tuple(name for name, _ in fits.gives)
         scales = unet.scales_of(self.ready(5, COLOURS).params)
-        gives = (("image", 0), *([("error", 0)] if self.with_error else []))
+        gives = (("image", 0), *[("error", 0)] * self.with_error)
         return (
             *before,
             fits,
-            Stage(evaluate, (("fitted", 0), ("noise", 0)), given, pixels=True, reach=2 * side),
+            Stage(evaluate, (("fitted", 0), ("noise", 0)), fits.names, pixels=True, reach=2 * side),
             Stage(
                 correct,
                 (("image", 0),),
@@ -107,7 +106,7 @@ class FLNR(AdaptiveFLR):
                 reach=unet.reach_of(scales),
                 align=1 << scales,
                 totals=(("sums", 1),),
-                learn=learn_share,
+                learn=adaptive.learn_kept,
             ),
             Stage(restore, gives, ("image", "noise")),
         )
@@ -116,29 +115,14 @@ class FLNR(AdaptiveFLR):
 DEFAULT = FLNR()
 
 
-def flnr(
-    target: jax.Array,
-    guides: Guides,
-    method: FLNR = DEFAULT,
-    *,
-    weight: jax.Array | None = None,
-    **options: Any,
-) -> Any:
+def flnr(target: jax.Array, guides: Guides, method: FLNR = DEFAULT, **options: Any) -> Any:
     """Denoise with the network's help. Scales with `target`.
 
     target: `(H, W, C)`, the noisy radiance, not negative; C is 3, or 6, 9, ... for light groups,
     whose results sum to the denoised sum. guides: `(H, W, 5)` or several arrays: normal, depth over
-    its typical value, ambient occlusion, which may be missing. method, options: as of
-    `flr_adaptive`. weight: `(H, W)`, a mask; 0 removes a pixel, as does any value that is not
-    finite.
-    Returns `(H, W, C)`; `with_error` also `(H, W, 1)`, the standard error of its brightness.
-
-    Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
+    its typical value, ambient occlusion, which may be missing. All else as of `flr_adaptive`.
     """
-    check_regression(target, guides, None, weight)
-    method = dataclasses.replace(method, **options).ready(channel_count(guides), target.shape[2])
-    given = regress(method, {"target": target, "guides": guides, "weight": weight})
-    return (given["image"], given["error"]) if method.with_error else given["image"]
+    return flr_adaptive(target, guides, method, **options)
 
 
 def init(key: jax.Array, widths: Sequence[int]) -> unet.Params:
@@ -158,14 +142,6 @@ def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
     gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
     image = light * jnp.tile(gain, light.shape[2] // COLOURS)
     return {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
-
-
-def learn_share(method: FLNR, known: Known, sums: Parts) -> Known:
-    """What brings the brightness of the result near the input's."""
-    before, after = sums["sums"]
-    slack = 0 if method.keep_energy else method.slack
-    wanted = jnp.clip(after, (1 - slack) * before, (1 + slack) * before)
-    return {"share": jnp.where(after > 0, wanted / jnp.where(after > 0, after, 1), 1)}
 
 
 def restore(method: FLNR, parts: Parts, known: Known) -> Parts:

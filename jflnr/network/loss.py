@@ -1,13 +1,11 @@
 """What training minimises: errors of the picture as it is displayed."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 
 from jflnr.metrics import GAMMA
 from jflnr.network import flnr, unet
-from jflnr.network.examples import FLOOR, Example
+from jflnr.network.examples import LEAST_ERROR, Example
 
 # Weight of SMAPE against decibels.
 SMAPE = 5.0
@@ -31,7 +29,7 @@ def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:
     picture, target: `(H, W, 3)`, reflected light as exposed.
     """
     smape = jnp.mean(jnp.abs(picture - target) / (jnp.abs(picture) + target + 0.01))
-    return 10 * jnp.log10(_error(picture, target) + FLOOR) + SMAPE * smape
+    return 10 * jnp.log10(_error(picture, target) + LEAST_ERROR) + SMAPE * smape
 
 
 def _error(picture: jax.Array, target: jax.Array) -> jax.Array:

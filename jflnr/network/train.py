@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,14 +95,14 @@ def train(
         raise ValueError("there are no frames to train on")
     params = flnr.init(jax.random.key(settings.seed), settings.widths)
     state, best = adam.start(params), params
-    score = Validation(validation)
+    score = functools.partial(validate, list(before_validation(validation)))
     history = [Progress(0, 0.0, float("nan"), score(params))]
     run = {"settings": repr(settings)}
     if state_file is not None and state_file.exists():
         (state, best), saved = load_state(state_file, (state, best), run)
         history = [Progress(*entry) for entry in saved]
     top = max(history, key=lambda entry: (np.nan_to_num(entry.score), entry.step))
-    step, losses, update = int(state.step), list[float](), _update()
+    step, losses = int(state.step), list[float]()
     stopped, began = False, 0.0
     spent = lambda: time.monotonic() - began
 
@@ -115,10 +115,10 @@ def train(
             # As it comes out of a step, or that would be compiled twice.
             state = jax.device_put(state, batches.replicated)
             if max(history[-1].seconds / seconds, step / steps) < 1:
-                update(state, batches(step), np.float32(0))  # compiled, and nothing else
+                _update(state, batches(step), np.float32(0))  # compiled, and nothing else
             began = time.monotonic() - history[-1].seconds
             while (done := max(spent() / seconds, step / steps)) < 1:
-                state, value = update(state, batches(step), rate_at(step, done, settings))
+                state, value = _update(state, batches(step), rate_at(step, done, settings))
                 losses.append(float(value))
                 step += 1
                 if step % settings.every == 0 or spent() >= seconds or step >= steps:
@@ -149,18 +149,15 @@ def rate_at(step: int, done: float, settings: Settings) -> np.float32:
     return np.float32(settings.rate * min(1, (step + 1) / WARM_UP) * falling + LEAST_RATE)
 
 
-@functools.cache
-def _update() -> Callable[[Adam, Example, np.float32], tuple[Adam, jax.Array]]:
-    """A step, compiled once for all runs."""
+@jax.jit
+def _update(state: Adam, batch: Example, rate: Any) -> tuple[Adam, jax.Array]:
+    """A step, and the mean loss before it."""
 
-    def mean_loss(params: unet.Params, batch: Example) -> jax.Array:
+    def mean_loss(params: unet.Params) -> jax.Array:
         return jnp.mean(jax.vmap(loss.relative_error, in_axes=(None, 0))(params, batch))
 
-    def update(state: Adam, batch: Example, rate: Any) -> tuple[Adam, jax.Array]:
-        value, gradient = jax.value_and_grad(mean_loss)(state.params, batch)
-        return adam.update(state, gradient, rate), value
-
-    return jax.jit(update)
+    value, gradient = jax.value_and_grad(mean_loss)(state.params)
+    return adam.update(state, gradient, rate), value
 
 
 class Batches:
@@ -207,35 +204,27 @@ class Shown(NamedTuple):
     target: np.ndarray
 
 
-class Validation:
-    """Mean PSNR over frames with a reference, all before the network done once."""
-
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.frames = [shown for path in paths for shown in self._frames(path)]
-
-    def __call__(self, params: unet.Params) -> dict[str, float]:
-        """In dB by samples per pixel, by the protocol of DESIGN.md."""
-        found: dict[str, list[float]] = {}
-        for spp, read, factor, target in self.frames:
-            picture = factor * np.asarray(_corrected(params, read), np.float64)
-            psnr = metrics.psnr(metrics.display(picture, 1), target)
-            found.setdefault(str(spp), []).append(psnr)
-        return {spp: float(np.mean(values)) for spp, values in found.items()}
-
-    @staticmethod
-    def _frames(path: Path) -> list[Shown]:
+def before_validation(paths: Sequence[Path]) -> Iterator[Shown]:
+    """Frames with a reference, all before the network done once."""
+    for path in paths:
         frame, light = examples.layers(path)
         albedo = np.asarray(frame.albedo, np.float64)
         wanted = albedo * np.asarray(frame.reference)
         scale = metrics.exposure(wanted)
-        found = []
-        for spp in COUNTS:
-            if spp in light:
-                noisy = dataclasses.replace(frame, indirect=light[spp][0])
-                read, unit = before_network(noisy)
-                factor = albedo * (unit * scale)
-                found.append(Shown(spp, read, factor, metrics.display(wanted, scale)))
-        return found
+        for spp in (spp for spp in COUNTS if spp in light):
+            read, unit = before_network(dataclasses.replace(frame, indirect=light[spp][0]))
+            factor, target = albedo * (unit * scale), metrics.display(wanted, scale)
+            yield Shown(spp, read, factor, target)
+
+
+def validate(frames: Sequence[Shown], params: unet.Params) -> dict[str, float]:
+    """Mean PSNR in dB by samples per pixel, by the protocol of DESIGN.md."""
+    found: dict[str, list[float]] = {}
+    for spp, read, factor, target in frames:
+        picture = factor * np.asarray(_corrected(params, read), np.float64)
+        psnr = metrics.psnr(metrics.display(picture, 1), target)
+        found.setdefault(str(spp), []).append(psnr)
+    return {spp: float(np.mean(values)) for spp, values in found.items()}
 
 
 @jax.jit

@@ -86,16 +86,6 @@ def reach_of(scales: int) -> int:
     return 2 * (reach + 1)
 
 
-def multiply_adds(params: Params) -> float:
-    """Of all layers, per pixel of the image."""
-    total = 0.0
-    for name, kernel in params.items():
-        if kernel.ndim == 4:
-            scale = int(name[-1]) + name.startswith(("down", "up")) if name[-1].isdigit() else 0
-            total += kernel.size / 4 ** (scale + 1)
-    return total
-
-
 def convolve(x: jax.Array, kernel: jax.Array, bias: jax.Array, stride: int = 1) -> jax.Array:
     """Convolution with zeros beyond the border.
 

@@ -4,8 +4,6 @@ The file is a plain .npz. Nothing in it is ever unpickled, and a file that is no
 network needs is refused.
 """
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 from typing import Any

@@ -6,5 +6,3 @@ from jflnr.opencl.devices import NoDevice, all_devices
 from jflnr.opencl.flnr import flnr
 from jflnr.opencl.flr import flr
 from jflnr.opencl.noisy_guides import smooth_guide
-
-__all__ = ["Context", "NoDevice", "all_devices", "flnr", "flr", "flr_adaptive", "smooth_guide"]

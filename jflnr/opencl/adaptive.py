@@ -1,10 +1,9 @@
 """Adaptive FLR on OpenCL devices: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.merge import merge, signal_share
 from jflnr.opencl.moments import centre, collect
-from jflnr.opencl.pyramid import halve, halve_planes
+from jflnr.opencl.resampling import halve, halve_planes
 from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
@@ -33,7 +32,7 @@ from jflnr.regression.arguments import channel_count, check_regression
 
 
 class Step(NamedTuple):
-    """One level finer than what was known before; see `jflnr.regression.widths.Step`.
+    """One level finer than what was known before; see `jflnr.regression.multiscale.Step`.
 
     fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
     coarser grid.
@@ -44,22 +43,15 @@ class Step(NamedTuple):
     share: Grid
 
 
+# The light, the guides and what each pixel counts, on the device.
+Images: TypeAlias = "tuple[Any, tuple[Any, ...], Any | None]"
+
 # Light above this is divided by a power of two first: its squares would leave float32.
 BRIGHT = 1e15
 
 
 @one_sentence
-def flr_adaptive(
-    target: Any,
-    guides: Any,
-    method: AdaptiveFLR = DEFAULT,
-    *,
-    weight: Any | None = None,
-    context: Context | None = None,
-    out: Any | None = None,
-    on_device: bool = False,
-    **options: Any,
-) -> Any:
+def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flr_adaptive` on an OpenCL device: same arguments, same result.
 
     target, guides and weight may be arrays of numpy or JAX, or device arrays; context, out and
@@ -68,23 +60,45 @@ def flr_adaptive(
 
     Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
     """
+    return run_on_images(write, target, guides, method, **options)
+
+
+def run_on_images(
+    write: Callable[[Context, Images, Any, Any], None],
+    target: Any,
+    guides: Any,
+    method: Any,
+    *,
+    weight: Any | None = None,
+    context: Context | None = None,
+    out: Any | None = None,
+    on_device: bool = False,
+    **options: Any,
+) -> Any:
+    """What `flr_adaptive` returns. write: the result, from images and method, to a device array."""
     context = default_context() if context is None else context
     method = dataclasses.replace(method, **options)
     if method.with_error:
         raise ValueError("the standard error is told on the jax backend only")
     check_regression(target, guides, None, weight)
     check_counts(channel_count(guides), target.shape[2])
+    method = method.ready(channel_count(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
     pixels, unit = in_unit(target)
-    images = context.array(pixels), to_layers(context, guides)
-    counts = to_weight(context, weight)
-    image = context.empty(target.shape) if method.keep_energy else output
-    write_light(context, *images, counts, method, image)
-    if method.keep_energy:
-        rescale(context, image, images[0], counts, output)
+    images = context.array(pixels), to_layers(context, guides), to_weight(context, weight)
+    write(context, images, method, output)
     if unit != 1:
         context.scale(output, unit)
     return context.finish(output, result)
+
+
+def write(context: Context, images: Images, method: AdaptiveFLR, output: Any) -> None:
+    """Write the light, `(H, W, C)`, with the brightness of the input if that is to be kept."""
+    target, _, weight = images
+    image = context.empty(target.shape) if method.keep_energy else output
+    write_light(context, *images, method, image)
+    if method.keep_energy:
+        rescale(context, image, target, weight, output)
 
 
 def in_unit(target: Any) -> tuple[Any, np.float32]:
@@ -143,12 +157,7 @@ def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Grid:
     return fit_level(run, halve_planes(run, moments, w), 4 * block).models
 
 
-def fit_levels(
-    run: Run,
-    moments: Grid,
-    block: int,
-    levels: int,
-) -> tuple[list[Step], Grid]:
+def fit_levels(run: Run, moments: Grid, block: int, levels: int) -> tuple[list[Step], Grid]:
     """The steps from the coarsest grid to the finest, and the models put together from all levels.
 
     block: side of the finest blocks.

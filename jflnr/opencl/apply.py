@@ -1,7 +1,5 @@
 """Host side of kernels_cl/apply.cl; its twin in JAX is jflnr/regression/apply.py."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from jflnr.opencl.context import Context

@@ -1,7 +1,5 @@
 """Arguments of the regressions, from arrays of numpy or JAX to what the kernels can read."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/blur.cl; its twin in JAX is jflnr/regression/blur.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ from jflnr.opencl.context import Context
 def gaussian_taps(sigma: float, reach: int) -> np.ndarray:
     """Gaussian weights at -reach..reach with sum 1, `(2 reach + 1,)` float32."""
     offsets = np.arange(-reach, reach + 1)
-    # The floor keeps a width of zero the identity instead of 0/0.
+    # The bound keeps a width of zero the identity instead of 0/0.
     taps = np.exp(-0.5 * (offsets / max(sigma, 1e-2)) ** 2)
     return (taps / taps.sum()).astype(np.float32)
 

@@ -1,7 +1,5 @@
 """BMFR on an OpenCL device: host side of kernels_cl/bmfr/; its twin is jflnr/bmfr/pipeline.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -13,6 +11,7 @@ from jflnr.frame import Frame
 from jflnr.opencl.arguments import to_output
 from jflnr.opencl.bmfr_fit import fit
 from jflnr.opencl.context import Context, default_context, is_device_array
+from jflnr.opencl.moments import guide_defines, run_on_rows
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 
 
@@ -74,11 +73,7 @@ def to_device(context: Context, layer: Any) -> Any:
 
 
 def accumulate_light(
-    context: Context,
-    history: History,
-    layers: dict[str, Any],
-    method: BMFR,
-    depths: bool,
+    context: Context, history: History, layers: dict[str, Any], method: BMFR, depths: bool
 ) -> tuple[Any, Any, Any]:
     """Phase I: mean of the samples at each place; see `jflnr.bmfr.pipeline.accumulate_light`.
 
@@ -90,12 +85,12 @@ def accumulate_light(
     accepted = context.empty((height, width), np.uint8)
     before = history.surface
     arguments = (
-        OFF_PLANE, SAME_NORMAL, method.light_share, layers["sample"], layers["surface"],
-        layers["motion"], layers["normal"], layers["depth"], layers["position"], before.normal,
-        before.depth, before.position, history.samples, history.light, light, count, accepted,
+        OFF_PLANE, SAME_NORMAL, layers["motion"], layers["normal"], layers["depth"],
+        layers["position"], before.normal, before.depth, before.position, method.light_share,
+        layers["sample"], layers["surface"], history.samples, history.light, light, count, accepted,
     )  # fmt: skip
     defines = {"MOST": pipeline.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
-    run_on_rows(context, "accumulate_light", (width, height), arguments, defines)
+    run(context, "accumulate_light", layers, arguments, defines)
     return light, count, accepted
 
 
@@ -115,7 +110,7 @@ def accumulate_fitted(
         method.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
         history.fitted, mean, picture,
     )  # fmt: skip
-    run_on_rows(context, "accumulate_fitted", (width, height), arguments)
+    run(context, "accumulate_fitted", layers, arguments)
     return mean, picture
 
 
@@ -129,30 +124,23 @@ def taa(
     image: Any,
 ) -> Any:
     """Phase III: the smoothed picture, `(H, W, 3)`; writes `image`, the same without albedo."""
-    height, width = mean.shape[:2]
     smooth = context.empty(mean.shape)
     arguments = (
         method.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
         layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
-    run_on_rows(context, "taa", (width, height), arguments)
+    run(context, "taa", layers, arguments)
     return smooth
 
 
-def run_on_rows(
+def run(
     context: Context,
     name: str,
-    size: tuple[int, int],
+    layers: dict[str, Any],
     arguments: tuple[Any, ...],
     defines: dict[str, int] | None = None,
 ) -> None:
-    """Enqueue kernels_cl/bmfr/`name`.cl over vectors of neighbours, which may overlap.
-
-    size: width and height of the frame.
-    """
-    width, height = size
-    lanes = context.width() if width >= context.width() else 1
-    channels = {"Q": 6, "C": 3, "PART_0": 3, "PART_1": 3, "PART_2": 0, "PART_3": 0, "PART_4": 0}
-    defines = {**channels, "WIDTH": lanes, **(defines or {})}
-    groups = -(-width // lanes), height
-    context.run(name, f"bmfr/{name}.cl", defines, groups, (width, height, *arguments))
+    """Enqueue kernels_cl/bmfr/`name`.cl on all pixels."""
+    height, width = layers["motion"].shape[:2]
+    defines = guide_defines((layers["normal"], layers["position"]), 3) | (defines or {})
+    run_on_rows(context, name, f"bmfr/{name}.cl", defines, (width, height, *arguments))

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/bmfr/fit.cl and weighted_sum.cl; the twin is bmfr/fit.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.bmfr.fit import FLAT, grid_offset
@@ -39,7 +37,8 @@ def fit(
     reached = context.empty((h, w, SCALED, 2))
     alpha = context.empty((h, w, COLUMNS - CHANNELS, CHANNELS))
     guides = guide_arguments(features)
-    workers = 1 if context.on_cpu else _power_of_two(context)
+    most = min(context.work_group, context.device.max_work_group_size)
+    workers = 1 if context.on_cpu else 1 << (most.bit_length() - 1)  # a power of two
     matrix = COLUMNS * block * block
     scratch: list[Any] = []
     extra = {"WORKERS": workers}
@@ -66,9 +65,3 @@ def fit(
         (width, height, w, x, y, surface, *guides, reached, alpha, fitted),
     )
     return fitted
-
-
-def _power_of_two(context: Context) -> int:
-    """The largest power of two that a work-group may have, of at most 256."""
-    most = min(context.work_group, context.device.max_work_group_size)
-    return 1 << (most.bit_length() - 1)

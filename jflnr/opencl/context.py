@@ -1,7 +1,5 @@
 """What is kept between frames on one device: queue, programs, buffers, and the times of kernels."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import math

@@ -1,7 +1,5 @@
 """The OpenCL devices of this machine, and the choice of one."""
 
-from __future__ import annotations
-
 import os
 from types import ModuleType
 from typing import Any

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/energy.cl and rescale.cl; the twin is jflnr/regression/energy.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.context import Context
@@ -41,12 +39,7 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
 
 
 def rescale(
-    context: Context,
-    image: Any,
-    target: Any,
-    weight: Any | None,
-    output: Any,
-    slack: float = 0.0,
+    context: Context, image: Any, target: Any, weight: Any | None, output: Any, slack: float = 0.0
 ) -> None:
     """Scale the result so that its brightness sums to the input's over the pixels that count.
 

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/floor.cl; its twin in JAX is jflnr/regression/floor.py."""
 
-from __future__ import annotations
-
 from jflnr.opencl.grids import Grid, Run
 
 

@@ -1,7 +1,5 @@
 """Fast Local Regression on an OpenCL device: moments, blur, solve, apply (section 3.2)."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 
@@ -43,7 +41,8 @@ def flr(
     """
     context = default_context() if context is None else context
     method = dataclasses.replace(method, **options)
-    factor, shape = check_regression(target, guides, guides_map, weight), _shape(target, guides_map)
+    factor = check_regression(target, guides, guides_map, weight)
+    shape = (*(layers_of(guides_map) or [target])[0].shape[:2], target.shape[2])
     method = method.at(factor, max(shape[:2]))
     y, channels = context.array(to_image(target)), target.shape[2]
     x, count = to_layers(context, guides), channel_count(guides)
@@ -61,8 +60,3 @@ def flr(
     model = solve(context, moments, shift, method, count, channels)
     apply(context, model, x_map, shift, step, (*size, model.shape[3]), output)
     return context.finish(output, result)
-
-
-def _shape(target: Any, guides_map: Any | None) -> tuple[int, int, int]:
-    layers = [] if guides_map is None else layers_of(guides_map)
-    return (*(layers[0] if layers else target).shape[:2], target.shape[2])

@@ -1,7 +1,5 @@
 """Grids of blocks on the device, as kernels_cl/grids.h describes them."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -67,8 +65,8 @@ class Run(NamedTuple):
 
         With a define DOWN neighbouring work-items are below each other.
         """
-        width = self.context.width()
-        everywhere = {"Q": self.guides, "C": self.channels, "WIDTH": width, "REACH": REACH}
+        width = defines.setdefault("WIDTH", self.context.width())
+        everywhere = {"Q": self.guides, "C": self.channels, "REACH": REACH}
         everywhere |= brightness_defines(self.channels)
         h, pitch = grid.size
         size = (h, pitch // width) if defines.get("DOWN") else (pitch // width, h)

@@ -3,8 +3,6 @@
 Its twin in JAX is jflnr/regression/level.py.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from jflnr.opencl.grids import Grid, Run
@@ -17,32 +15,17 @@ class Level(NamedTuple):
 
     moments: K planes, weighted, and one of noise. features: the scaled mean guides of each block
     and, where there is a coarser level, a measure of the brightness found there, and that
-    brightness itself. alike: how many of them must be alike in a window. models: see
-    kernels_cl/models.h.
+    brightness itself. models: see kernels_cl/models.h. defines: those of kernels_cl/window.h.
     """
 
     moments: Grid
     features: Grid
-    alike: int
     models: Grid
-
-    def defines(self) -> dict[str, int]:
-        """Those of kernels_cl/window.h."""
-        return window_defines(self.features, self.alike)
-
-
-def window_defines(features: Grid, alike: int) -> dict[str, int]:
-    """Those of kernels_cl/window.h."""
-    return {"FEATURES": alike, "FEATURE_PLANES": features.number}
+    defines: dict[str, int]
 
 
 def fit_level(
-    run: Run,
-    moments: Grid,
-    side: int,
-    found: Grid | None = None,
-    *,
-    slopes: bool = True,
+    run: Run, moments: Grid, side: int, found: Grid | None = None, *, slopes: bool = True
 ) -> Level:
     """Fit the models of one level.
 
@@ -51,11 +34,13 @@ def fit_level(
     guides.
     """
     features = _features(run, moments, found)
-    alike = run.guides + (found is not None)
-    options = window_defines(features, alike) | {"POSITIONS": int(slopes)}
-    options["NOISE"] = moments.number - plane_count(run.guides, run.channels)
+    # That brightness is not compared inside a window.
+    compared = run.guides + (found is not None)
+    window = {"FEATURES": compared, "FEATURE_PLANES": features.number}
+    noise = moments.number - plane_count(run.guides, run.channels)
+    options = {**window, "POSITIONS": int(slopes), "NOISE": noise}
     rows = _window_rows(run, moments, features, options)
-    return Level(moments, features, alike, _fit(run, rows, side, features, options))
+    return Level(moments, features, _fit(run, rows, side, features, options), window)
 
 
 def _features(run: Run, moments: Grid, found: Grid | None) -> Grid:

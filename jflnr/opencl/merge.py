@@ -1,10 +1,8 @@
 """Host side of kernels_cl/merge.cl; its twin in JAX is jflnr/regression/merge.py."""
 
-from __future__ import annotations
-
 from jflnr.opencl.grids import Grid, Run
 from jflnr.opencl.level import Level, new_models
-from jflnr.opencl.pyramid import halve
+from jflnr.opencl.resampling import halve
 
 
 def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
@@ -12,7 +10,7 @@ def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
 
     Means are taken under the windows of the coarser level.
     """
-    options, windows = coarse.defines(), coarse.features.planes
+    options, windows = coarse.defines, coarse.features.planes
     signal = halve(run, _signal(run, fine, coarse, options))
     h, w, pitch = signal.sizes
     rows, share = run.grid(3, h, w), run.grid(1, h, w)

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/moments.cl; its twin in JAX is jflnr/regression/moments.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.context import Context
@@ -23,6 +21,18 @@ def guide_defines(guides: tuple[Any, ...], channels: int) -> dict[str, int]:
 def guide_arguments(guides: tuple[Any, ...]) -> tuple[Any, ...]:
     """The guides as the kernels take them."""
     return (*guides, *(None for _ in range(PARTS - len(guides))))
+
+
+def run_on_rows(
+    context: Context, name: str, file: str, defines: dict[str, Any], arguments: tuple[Any, ...]
+) -> None:
+    """Enqueue a kernel over vectors of neighbours in a row, which may overlap.
+
+    arguments: the first two are width and height of the frame.
+    """
+    width, height = arguments[:2]
+    lanes = context.width() if width >= context.width() else 1
+    context.run(name, file, {**defines, "WIDTH": lanes}, (-(-width // lanes), height), arguments)
 
 
 def weight_defines(weight: Any | None) -> dict[str, int]:

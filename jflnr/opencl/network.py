@@ -3,8 +3,6 @@
 The twins in JAX are jflnr/network/features.py, unet.py and flnr.py.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/noisy_guides.cl; its twin in JAX is jflnr/images/noisy_guides.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.checks import one_sentence

@@ -1,7 +1,5 @@
 """Where the time goes: every kernel's share, next to what the device's memory can do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -45,7 +43,9 @@ def _launches(context: Context, work: Callable[[], Any]) -> dict[str, tuple[floa
     """Milliseconds and bytes by kernel of one run of `work` and of the copy kernel."""
     with context.recorded() as launches:
         work()
-        _copy(context)
+        copied, width = [context.empty((COPIED // 4,)) for _ in range(2)], context.width()
+        size, arguments = (COPIED // 4 // width,), (COPIED // 4, *copied)
+        context.run("copy", "copy.cl", {"WIDTH": width}, size, arguments)
         context.queue.finish()
     summed: dict[str, tuple[float, int]] = {}
     for launch in launches:
@@ -53,10 +53,3 @@ def _launches(context: Context, work: Callable[[], Any]) -> dict[str, tuple[floa
         span = (launch.event.profile.end - launch.event.profile.start) / 1e6
         summed[launch.kernel] = ms + span, moved + launch.bytes
     return summed
-
-
-def _copy(context: Context) -> None:
-    count = COPIED // 4
-    source, target = (context.empty((count,)) for _ in range(2))
-    width = context.width()
-    context.run("copy", "copy.cl", {"WIDTH": width}, (count // width,), (count, source, target))

@@ -1,7 +1,5 @@
 """Host side of kernels_cl/solve.cl; its twin in JAX is jflnr/regression/solve.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jflnr.opencl.context import Context

@@ -1,7 +1,5 @@
 """Denoising with a history on an OpenCL device: the steps of jflnr/temporal/sequence.py."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any
@@ -16,14 +14,13 @@ from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.bmfr import to_device
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
+from jflnr.opencl.moments import guide_defines, run_on_rows
 from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import State, Temporal, prepared
-
-PARTS = {f"PART_{i}": 0 for i in range(5)}
+from jflnr.temporal.sequence import PAST, State, Temporal, prepared
 
 
 def start(frame: Frame, context: Context | None = None) -> State:
@@ -42,10 +39,10 @@ def step(
     frame: Frame,
     method: Any = None,
     *,
-    guides: Sequence[str] | None = None,
-    temporal: Temporal | None = None,
+    temporal: Temporal = PAST,
     context: Context | None = None,
     on_device: bool = False,
+    guides: Sequence[str] | None = None,
     **options: Any,
 ) -> tuple[State, Any]:
     """`jflnr.temporal.step` on an OpenCL device: same arguments, same result.
@@ -58,7 +55,6 @@ def step(
     """
     context = default_context() if context is None else context
     method, names, inputs = prepared(state, frame, method, guides, options)
-    temporal = temporal or Temporal()
     smooth = functools.partial(smooth_guide, context=context)
     given = method.images(inputs, names, smooth=smooth)
     layers = to_layers(context, given["guides"])
@@ -103,25 +99,17 @@ def reproject(
     # Surfaces without a position are told apart by depth; what stands in its place is not used.
     places = [s.normal if depths else s.position for s in (surface, before)]
     arguments = (
-        width, height, OFF_PLANE, SAME_NORMAL, covered, motion, surface.normal, surface.depth,
-        places[0], before.normal, before.depth, places[1], *state.light, *state.image, *light,
+        width, height, OFF_PLANE, SAME_NORMAL, motion, surface.normal, surface.depth, places[0],
+        before.normal, before.depth, places[1], covered, *state.light, *state.image, *light,
         *image, expected, known,
     )  # fmt: skip
-    lanes = context.width() if width >= context.width() else 1
-    defines = {"Q": 0, "C": 3, "WIDTH": lanes, **PARTS, **brightness_defines(3)}
-    defines |= {"DEPTHS": 1} if depths else {}
-    size = -(-width // lanes), height
-    context.run("reproject", "temporal/reproject.cl", defines, size, arguments)
+    defines = guide_defines((), 3) | brightness_defines(3) | ({"DEPTHS": 1} if depths else {})
+    run_on_rows(context, "reproject", "temporal/reproject.cl", defines, arguments)
     return light, image, expected, known
 
 
 def accumulate(
-    context: Context,
-    before: Average,
-    change: Change,
-    image: Any,
-    covered: Any,
-    least: float,
+    context: Context, before: Average, change: Change, image: Any, covered: Any, least: float
 ) -> tuple[Average, Any]:
     """An average that follows the change, with `image` in it; its samples times `covered`, which
     says how much a pixel counts, `(H, W)`.
@@ -131,12 +119,11 @@ def accumulate(
     height, width = image.shape[:2]
     average, weight = _new_average(context, height, width), context.empty((height, width))
     lanes = context.width() if height * width >= context.width() else 1
-    defines = {"Q": 0, "C": 3, "WIDTH": lanes, **PARTS}
     arguments = (
         height * width, least, change.unit, *before, change.signal, change.noise, image, covered,
         *average, weight,
     )  # fmt: skip
-    size = (-(-height * width // lanes),)
+    defines, size = guide_defines((), 3) | {"WIDTH": lanes}, (-(-height * width // lanes),)
     context.run("accumulate", "temporal/accumulate.cl", defines, size, arguments)
     return average, weight
 

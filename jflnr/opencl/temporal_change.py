@@ -3,8 +3,6 @@
 Its twin in JAX is jflnr/temporal/change.py.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,15 +11,16 @@ from jflnr.opencl.apply import apply
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP, Grid, Run, brightness_defines
 from jflnr.opencl.level import Level, fit_level
-from jflnr.opencl.moments import centre, collect
+from jflnr.opencl.moments import centre, collect, guide_defines, run_on_rows
 from jflnr.regression.adaptive import DEFAULT
 from jflnr.regression.moments import plane_count
-from jflnr.regression.window import REACH
 from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY, UNCOVERED
 
 NUMBERS = DEFAULT
 # Planes that are averaged over the windows, see change.cl.
 PLANES = 5
+FILE = "temporal/change.cl"
+NO_WINDOW = {"FEATURES": 0, "FEATURE_PLANES": 0}
 
 
 class Change(NamedTuple):
@@ -60,10 +59,10 @@ def find_change(
     moments = collect(context, target, guides, shift, BLOCK, weight)
     count = sum(layer.shape[2] for layer in guides)
     run = Run(context, count, 3, NUMBERS, shift, mean)
-    grid, level = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
+    grid, luminance = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
     fit = fit_level(run, grid, BLOCK)
-    model, wrong, evidence = _judge(run, fit, level, evidence, caution)
-    _add_uncovered(run, known, covered, wrong)
+    model, wrong, evidence = _judge(run, fit, luminance, evidence, caution)
+    _add_uncovered(run, known, covered, grid, wrong)
     signal, noise = context.empty(sample.shape), context.empty((*sample.shape[:2], 1))
     apply(context, model, guides, shift, BLOCK, grid.sizes, signal)
     apply(context, wrong, (), shift, BLOCK, grid.sizes, noise)
@@ -76,9 +75,7 @@ def _difference(
     """Target `(H, W, 5)` and weight `(H, W)` for the moments, and the unit, `(1,)`."""
     height, width = sample.shape[:2]
     rows, unit = context.empty((height, 2)), context.empty((1,))
-    lanes = context.width() if width >= context.width() else 1
-    defines = {"Q": 0, "C": 5, "WIDTH": lanes, **{f"PART_{i}": 0 for i in range(5)}}
-    defines |= brightness_defines(3)
+    defines = guide_defines((), 5) | brightness_defines(3) | {"WIDTH": context.width()}
     file = "temporal/difference.cl"
     context.run("unit_rows", file, defines, (height,), (width, height, expected, known, rows))
     context.run("unit", file, defines, (1,), (height, rows, unit))
@@ -86,23 +83,21 @@ def _difference(
     arguments = (
         width, height, NUMBERS.offset, sample, light, expected, known, unit, target, weight
     )  # fmt: skip
-    context.run("difference", file, defines, (-(-width // lanes), height), arguments)
+    run_on_rows(context, "difference", file, defines, arguments)
     return target, weight, unit
 
 
 def _arrange(run: Run, moments: Any, w: int) -> tuple[Grid, Grid]:
     """The moments of the difference and its noise, and the brightness of the history."""
     h, from_pitch = moments.shape[1:]
-    grid, level = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
-    defines = _defines(run) | {"WIDTH": 1}
-    pitch = grid.size[1]
-    arguments = h, w, pitch, from_pitch, moments, grid.planes, level.planes
-    run.context.run("arrange", "temporal/change.cl", defines, (pitch, h), arguments)
-    return grid, level
+    grid, luminance = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
+    arguments = h, w, grid.size[1], from_pitch, moments, grid.planes, luminance.planes
+    run.launch("arrange", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)
+    return grid, luminance
 
 
 def _judge(
-    run: Run, fit: Level, level: Grid, evidence: Any, caution: float
+    run: Run, fit: Level, luminance: Grid, evidence: Any, caution: float
 ) -> tuple[Any, Any, Any]:
     """The models of what is signal, `(Q + 1, 3, h, pitch)`, the noise that the history takes on,
     `(1, 1, h, pitch)`, and the evidence for the next frame."""
@@ -113,10 +108,10 @@ def _judge(
     features, moments, models = fit.features.planes, fit.moments.planes, fit.models.planes
 
     def launch(name: str, *arguments: Any) -> None:
-        run.launch(name, "temporal/change.cl", rows, (h, pitch, *arguments), **_defines(run))
+        run.launch(name, FILE, rows, (h, pitch, *arguments), **fit.defines)
 
     scale, sigma = run.numbers.guide_scale, run.numbers.sigma
-    launch("measure", DIM, scale, moments, features, models, level.planes, planes.planes)
+    launch("measure", DIM, scale, moments, features, models, luminance.planes, planes.planes)
     launch("change_rows", sigma, features, planes.planes, rows.planes)
     launch(
         "judge", sigma, caution, NEWEST, FOLLOWED, NOVELTY, features, moments, rows.planes, models,
@@ -125,16 +120,7 @@ def _judge(
     return model, wrong, after.planes
 
 
-def _add_uncovered(run: Run, known: Any, covered: Any, wrong: Any) -> None:
+def _add_uncovered(run: Run, known: Any, covered: Any, grid: Grid, wrong: Any) -> None:
     """Adds what the history takes on around places that come into view to `wrong`."""
-    height, width = known.shape
-    h, pitch = wrong.shape[2:]
-    w = -(-width // BLOCK)
-    arguments = height, width, pitch, BLOCK, UNCOVERED, known, covered, wrong
-    defines = _defines(run) | {"WIDTH": 1}
-    run.context.run("add_uncovered", "temporal/change.cl", defines, (w, h), arguments)
-
-
-def _defines(run: Run) -> dict[str, Any]:
-    planes = {"FEATURES": run.guides, "FEATURE_PLANES": max(run.guides, 1)}
-    return {"Q": run.guides, "C": 3, "REACH": REACH, **planes, **brightness_defines(3)}
+    arguments = *known.shape, grid.size[1], BLOCK, UNCOVERED, known, covered, wrong
+    run.launch("add_uncovered", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)

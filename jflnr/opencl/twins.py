@@ -1,21 +1,22 @@
 """Which function runs a method on an OpenCL device."""
 
-from __future__ import annotations
-
-import importlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
+from jflnr.opencl.flnr import flnr
+from jflnr.opencl.flr import flr
 from jflnr.stages import Parts, compose
 
-# By the method's type: module, function.
-REGRESSIONS = {
-    "FLR": ("flr", "flr"),
-    "AdaptiveFLR": ("adaptive", "flr_adaptive"),
-    "FLNR": ("flnr", "flnr"),
-    "WholePicture": ("adaptive", "flr_adaptive"),
+# By the method's type.
+REGRESSIONS: dict[str, Callable[..., Any]] = {
+    "FLR": flr,
+    "AdaptiveFLR": flr_adaptive,
+    "FLNR": flnr,
+    "WholePicture": flr_adaptive,
 }
 
 
@@ -34,16 +35,9 @@ def regress(
     others = ("guides_map", "weight")
     given = {name: images[name] for name in others if images.get(name) is not None} | options
     later = composed and any(stage.composes for stage in method.stages())
-    module, function = REGRESSIONS[type(method).__name__]
-    run = getattr(importlib.import_module(f"jflnr.opencl.{module}"), function)
-    light = run(
-        images["target"],
-        images["guides"],
-        method,
-        context=context,
-        out=None if later else out,
-        **given,
-    )
+    run = REGRESSIONS[type(method).__name__]
+    given |= {"context": context, "out": None if later else out}
+    light = run(images["target"], images["guides"], method, **given)
     if not later:
         return light
     picture = np.asarray(compose(method, images | {"image": light}))

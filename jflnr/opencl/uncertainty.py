@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/error.cl; its twin in JAX is jflnr/regression/uncertainty.py."""
+"""Host side of kernels_cl/uncertainty.cl; its twin in JAX is jflnr/regression/uncertainty.py."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def standard_error(
             after.planes,
         )  # fmt: skip
         defines = {"COUNT": fine.moments.number} | ({"FIRST": 1} if before is None else {})
-        run.launch("error_step", "error.cl", after, arguments, **defines)
+        run.launch("error_step", "uncertainty.cl", after, arguments, **defines)
         before = after
     assert before is not None
     (h, w, pitch), (rate, brightness) = before.sizes, scale
@@ -40,5 +40,5 @@ def standard_error(
         h, pitch, brightness.shape[1], VARIANCE, LEFT_OUT, DETAIL, run.mean, rate, brightness,
         own.planes, before.planes, error,
     )  # fmt: skip
-    run.launch("standard_error", "error.cl", before, of_grid, COUNT=0)
+    run.launch("standard_error", "uncertainty.cl", before, of_grid, COUNT=0)
     apply(run.context, error, (), run.shift, step, (h, w, pitch), output)

@@ -1,10 +1,7 @@
 """Host side of kernels_cl/weighted_moments.cl; the twin is in jflnr/regression/moments.py."""
 
-from __future__ import annotations
-
 from typing import Any
 
-from jflnr.opencl.context import Context
 from jflnr.opencl.grids import Grid, Run, brightness_defines
 from jflnr.opencl.moments import guide_arguments, pixel_defines
 from jflnr.regression.moments import plane_count
@@ -21,7 +18,10 @@ def collect_weighted(
     height, width, channels = target.shape
     h, w = -(-height // block), -(-width // block)
     moments = run.grid(plane_count(run.guides, channels) + 1, h, w)
-    lanes, (_, pitch) = _lanes(run.context, block), moments.size
+    # Two blocks, or what divides one.
+    lanes = run.context.width(2 * block)
+    lanes = lanes if lanes == 2 * block else run.context.width(block)
+    pitch = moments.size[1]
     defines = {**pixel_defines(target, guides, weight, block), **brightness_defines(channels)}
     defines["WIDTH"] = lanes
     if run.numbers.exponent == 1:
@@ -34,9 +34,3 @@ def collect_weighted(
     file = "weighted_moments.cl"
     run.context.run("weighted_moments", file, defines, size, arguments, alone=True)
     return moments
-
-
-def _lanes(context: Context, block: int) -> int:
-    """Neighbours per work-item: two blocks, or what divides one."""
-    lanes = context.width(2 * block)
-    return lanes if lanes == 2 * block else context.width(block)

@@ -18,9 +18,9 @@ from jflnr.images.inputs import robust_images, same_size
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression import energy
 from jflnr.regression.apply import apply
-from jflnr.regression.arguments import check_options, check_regression
+from jflnr.regression.arguments import channel_count, check_options, check_regression
 from jflnr.regression.floor import with_own_light
-from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides, windowed
+from jflnr.regression.level import Grid, brightness, fit_level, mean_guides
 from jflnr.regression.moments import (
     Guides,
     centre,
@@ -28,12 +28,12 @@ from jflnr.regression.moments import (
     collect,
     collect_weighted,
     index_xy,
-    magnitude,
     planes,
+    unit_of,
 )
-from jflnr.regression.pyramid import halve
+from jflnr.regression.multiscale import fit_levels, merged_models
+from jflnr.regression.resampling import halve
 from jflnr.regression.uncertainty import DETAIL, block_error
-from jflnr.regression.widths import Step, fit_levels, guide_features, merged_models
 from jflnr.regression.window import REACH
 from jflnr.stages import Known, Parts, Stage, regress
 
@@ -61,7 +61,6 @@ class AdaptiveFLR:
     """
 
     name: ClassVar[str] = "flr-adaptive"
-    backends: ClassVar[tuple[str, ...]] = ("jax", "opencl")
     # Occlusion is averaged over 3 x 3 pixels.
     margin: ClassVar[int] = 1
     images: ClassVar[Any] = staticmethod(robust_images)
@@ -100,57 +99,45 @@ class AdaptiveFLR:
         same_size(frame, self.name)
         return self
 
+    def ready(self, guides: int, channels: int) -> AdaptiveFLR:
+        """With all that it needs for so many guides and channels of light."""
+        return self
+
     def known(self, images: Parts) -> Known:
         """What guides are measured from, and what the light is divided by."""
-        return {"shift": centre(images["guides"]), "unit": magnitude(images["target"])}
+        return {"shift": centre(images["guides"]), "unit": unit_of(images["target"])}
 
     def stages(self) -> tuple[Stage, ...]:
         side = self.finest
-        models = [("models", side), ("output", 2 * side)] + [("error", side)] * self.tells_error
-        return (
-            *first_stages(side),
-            Stage(
-                fit_models,
-                tuple(models),
-                ("moments", "light"),
-                reach=reach_of(self.levels) * side,
-                align=side << (self.levels - 1),
-                totals=(("kept", 2 * side),),
-                learn=learn_rate,
-            ),
-            *last_stages(evaluate, side, tuple(name for name, _ in models), self),
-        )
-
-
-def first_stages(side: int) -> tuple[Stage, ...]:
-    """Passes 1 and 2, with the pilot between them. side: pixels of the finest blocks."""
-    return (
-        Stage(
+        light = Stage(
             collect_light,
             (("light", 2 * side),),
             pixels=True,
             totals=(("counted", 2 * side),),
             learn=learn_mean,
-        ),
-        Stage(
-            fit_pilot,
-            (("pilot", 4 * side),),
-            ("light",),
-            reach=REACH * 4 * side,
-            align=4 * side,
-        ),
-        Stage(collect_moments, (("moments", side),), ("pilot",), pixels=True, reach=4 * side),
-    )
-
-
-def last_stages(evaluate: Any, side: int, reads: tuple[str, ...], method: Any) -> tuple[Stage, ...]:
-    """Pass 3 by `evaluate`, and one more over its result if the brightness is to be kept."""
-    gives = (("image", 0), *([("error", 0)] if method.with_error else []))
-    image = Stage(evaluate, gives, reads, pixels=True, reach=2 * side)
-    if not method.keep_energy:
-        return (image,)
-    image = dataclasses.replace(image, totals=(("sums", 1),), learn=learn_kept)
-    return image, Stage(keep_energy, gives, tuple(name for name, _ in gives))
+        )
+        pilot = Stage(
+            fit_pilot, (("pilot", 4 * side),), ("light",), reach=REACH * 4 * side, align=4 * side
+        )
+        moments = Stage(
+            collect_moments, (("moments", side),), ("pilot",), pixels=True, reach=4 * side
+        )
+        models = Stage(
+            fit_models,
+            (("models", side), ("output", 2 * side), *[("error", side)] * self.tells_error),
+            ("moments", "light"),
+            reach=reach_of(self.levels) * side,
+            align=side << (self.levels - 1),
+            totals=(("kept", 2 * side),),
+            learn=learn_rate,
+        )
+        gives = (("image", 0), *[("error", 0)] * self.with_error)
+        image = Stage(evaluate, gives, models.names, pixels=True, reach=2 * side)
+        stages = light, pilot, moments, models
+        if not self.keep_energy:
+            return (*stages, image)
+        image = dataclasses.replace(image, totals=(("sums", 1),), learn=learn_kept)
+        return (*stages, image, Stage(keep_energy, gives, image.names))
 
 
 def reach_of(levels: int) -> int:
@@ -191,6 +178,7 @@ def flr_adaptive(
     """
     method = dataclasses.replace(method, **options)
     check_regression(target, guides, None, weight)
+    method = method.ready(channel_count(guides), target.shape[-1])
     given = regress(method, {"target": target, "guides": guides, "weight": weight})
     return (given["image"], given["error"]) if method.with_error else given["image"]
 
@@ -218,11 +206,9 @@ def mean_light(count: jax.Array, light: jax.Array) -> jax.Array:
 
 def fit_pilot(method: Any, parts: Parts, known: Known) -> Parts:
     """Models of the brightness from the moments of pass 1, `(Q + 1, 1, h, w)`."""
-    light, shift = halve(parts["light"]), known["shift"]
+    light = halve(parts["light"])
     grid = Grid(light, jnp.zeros_like(light[:1]), 4 * method.finest)
-    features = guide_features(grid, shift.size, method)
-    system = windowed(grid, features, shift, 1, known["mean"], method)
-    return {"pilot": fit_level(system, shift.size, 1).coefficients}
+    return {"pilot": fit_level(grid, known["shift"], 1, known["mean"], method).coefficients}
 
 
 def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
@@ -235,38 +221,21 @@ def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
     return {"moments": jnp.concatenate(collect_weighted(*weighted))}
 
 
-def grid_of(moments: jax.Array, block: int) -> Grid:
-    """What pass 2 collected, as the fits take it."""
-    return Grid(moments[:-1], moments[-1:], block)
-
-
 def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """All levels: models `(Q + 2, C, h, w)`, the last row from `floor.with_own_light`; the
     brightness that they give blocks twice as large; and, asked for, their error."""
-    grid = grid_of(parts["moments"], method.finest)
-    levels = fit_steps(method, grid, known)
-    given = merged_parts(*levels, parts["light"], grid, known)
-    if method.tells_error:
-        given["error"] = block_error(*levels)
-    return given
-
-
-def fit_steps(method: Any, grid: Grid, known: Known) -> tuple[Fit, list[Step]]:
-    """The coarsest fit, and what each finer level adds."""
-    channels = channels_of(grid.moments, known["shift"].size)
-    return fit_levels(grid, known["shift"], channels, method.levels, known["mean"], method)
-
-
-def merged_parts(
-    coarsest: Fit, steps: list[Step], light: jax.Array, grid: Grid, known: Known
-) -> Parts:
-    """The models put together, their brightness, and what that sums up from."""
-    guides = known["shift"].size
-    models = merged_models(coarsest, steps)
-    output = energy.block_light(models, light, guides)
-    models = with_own_light(models, mean_guides(grid.moments, guides))
-    kept = jnp.stack([light[0] * output, light[0] * output**2])
-    return {"models": models, "output": output, "kept": kept}
+    shift, light, moments = known["shift"], parts["light"], parts["moments"]
+    grid = Grid(moments[:-1], moments[-1:], method.finest)
+    channels = channels_of(grid.moments, shift.size)
+    levels = fit_levels(grid, shift, channels, method.levels, known["mean"], method)
+    models = merged_models(*levels)
+    output = energy.block_light(models, light, shift.size)
+    given = {
+        "models": with_own_light(models, mean_guides(grid.moments, shift.size)),
+        "output": output,
+        "kept": jnp.stack([light[0] * output, light[0] * output**2]),
+    }
+    return given | ({"error": block_error(*levels)} if method.tells_error else {})
 
 
 def learn_rate(method: Any, known: Known, sums: Parts) -> Known:
@@ -278,24 +247,18 @@ def learn_rate(method: Any, known: Known, sums: Parts) -> Known:
 def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """Pass 3: the light of every pixel, `(H, W, C)`, and its error."""
     models = energy.scale(parts["models"], parts["output"], known["rate"])
-    given = light_parts(method, models, parts, known)
+    shift, unit = known["shift"], known["unit"]
+    image = apply(models, parts["guides"], shift, method.finest, method.floor) * unit
+    given = {"image": image}
+    if method.keep_energy:
+        given["sums"] = before_and_after(image, parts, unit)
     if method.tells_error:
         own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
-        # The floor is there for its root's derivative, and for pixels that see no light.
+        # The bound is there for its root's derivative, and for pixels that see no light.
         error = jnp.sqrt(parts["error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
         none = jnp.zeros((*parts["target"].shape[:2], 0), error.dtype)
-        shown = apply(error[None, None], none, known["shift"][:0], method.finest)
-        given["error"] = shown * known["unit"]
+        given["error"] = apply(error[None, None], none, shift[:0], method.finest) * unit
     return given
-
-
-def light_parts(method: Any, models: jax.Array, parts: Parts, known: Known) -> Parts:
-    """The image of models `(Q + 2, C, h, w)`, and what is needed to keep the brightness."""
-    guides, shift, unit = parts["guides"], known["shift"], known["unit"]
-    image = apply(models, guides, shift, method.finest, method.floor) * unit
-    if not method.keep_energy:
-        return {"image": image}
-    return {"image": image, "sums": before_and_after(image, parts, unit)}
 
 
 def before_and_after(image: jax.Array, parts: Parts, unit: jax.Array) -> jax.Array:
@@ -308,9 +271,12 @@ def before_and_after(image: jax.Array, parts: Parts, unit: jax.Array) -> jax.Arr
 
 
 def learn_kept(method: Any, known: Known, sums: Parts) -> Known:
-    """What brings the brightness of the result to the input's, over the pixels that count."""
+    """What brings the brightness of the result to the input's, or near it, over the pixels that
+    count."""
     before, after = sums["sums"]
-    return {"share": jnp.where(after > 0, before / jnp.where(after > 0, after, 1), 1)}
+    slack = 0 if method.keep_energy else method.slack
+    wanted = jnp.clip(after, (1 - slack) * before, (1 + slack) * before)
+    return {"share": jnp.where(after > 0, wanted / jnp.where(after > 0, after, 1), 1)}
 
 
 def keep_energy(method: Any, parts: Parts, known: Known) -> Parts:
@@ -341,7 +307,7 @@ def _weights(
     light, expected: `(H, W)`.
     Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
     """
-    # The floor is there for the logarithm; written so, the power takes a quarter of the time.
+    # The bound is there for the logarithm; written so, the power takes a quarter of the time.
     relative = jnp.log(jnp.maximum(expected / mean, 1e-6))
     weights = 1 / (jnp.exp(numbers.exponent * relative) + numbers.offset)
     usable = jnp.isfinite(light)

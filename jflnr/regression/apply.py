@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from jflnr.lazy import jax, jnp, lax
-from jflnr.regression.floor import lift
+from jflnr.regression.floor import clamp_to_floor
 from jflnr.regression.moments import Guides, from_shift, planes
 from jflnr.regression.strips import cut, fill, step_of
 
@@ -88,7 +88,7 @@ def apply_strip(
     channels = pixels(at_start + t * change)
     if floor is not None:
         own = pixels(start[-1, ..., None] + t * difference[-1, ..., None])
-        channels = lift(channels, own, floor)
+        channels = clamp_to_floor(channels, own, floor)
     return jnp.moveaxis(channels, 0, -1)
 
 

@@ -1,7 +1,5 @@
 """The arguments of a regression, checked at its boundary on static facts."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any
@@ -33,12 +31,7 @@ def block_for(block: int, longest: int) -> int:
     return min(block, 64 * max(-(-longest // 64), 1))
 
 
-def check_regression(
-    target: Any,
-    guides: Any,
-    guides_map: Any | None,
-    weight: Any | None,
-) -> int:
+def check_regression(target: Any, guides: Any, guides_map: Any | None, weight: Any | None) -> int:
     """Raise on wrong arguments of `flr`; return how many times finer `guides_map` is."""
     checks.image("target", target)
     if target.shape[2] == 0:

@@ -16,7 +16,7 @@ def gaussian_taps(
     Returns `(2 reach + 1,)`.
     """
     offsets = jnp.arange(-reach, reach + 1, dtype=dtype)
-    # The floor keeps a width of zero the identity instead of 0/0.
+    # The bound keeps a width of zero the identity instead of 0/0.
     variance = jnp.maximum(jnp.asarray(sigma, dtype), 1e-2) ** 2
     taps = jnp.where(jnp.abs(offsets) <= end, jnp.exp(-0.5 * offsets**2 / variance), 0)
     return taps / jnp.sum(taps)

@@ -6,7 +6,7 @@ from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.level import brightness, mean_guides, predict
 from jflnr.regression.moments import index_xy
-from jflnr.regression.pyramid import halve
+from jflnr.regression.resampling import halve
 
 
 def restore(
@@ -21,17 +21,10 @@ def restore(
     coefficients: `(Q + 1, C, h, w)`. moments: unweighted, of the brightness alone, at half the
     resolution. slack: a share, such as 0.025. Returns scaled coefficients.
     """
-    return coefficients * restoring_factor(coefficients, moments, guides, slack)
-
-
-def restoring_factor(
-    coefficients: jax.Array, moments: jax.Array, guides: int, slack: jax.Array | float
-) -> jax.Array:
-    """What `restore` multiplies the models of every block with, `(h, w)`."""
     output = block_light(coefficients, moments, guides)
     wanted = jnp.sum(moments[index_xy(0, 0, guides, 1)])
     sums = jnp.sum(moments[0] * output), jnp.sum(moments[0] * output**2)
-    return scale(jnp.ones_like(coefficients[:1, :1]), output, rate(wanted, *sums, slack))[0, 0]
+    return scale(coefficients, output, rate(wanted, *sums, slack))
 
 
 def block_light(coefficients: jax.Array, moments: jax.Array, guides: int) -> jax.Array:

@@ -23,7 +23,7 @@ def with_own_light(coefficients: jax.Array, guides: jax.Array) -> jax.Array:
     return jnp.concatenate([coefficients, own[None]])
 
 
-def lift(channels: jax.Array, own: jax.Array, floor: jax.Array | float) -> jax.Array:
+def clamp_to_floor(channels: jax.Array, own: jax.Array, floor: jax.Array | float) -> jax.Array:
     """Mix in as much of the block's own light that the brightness is `floor` times its brightness.
 
     All channels are mixed by one share, so that light groups go on summing to the whole. Where a

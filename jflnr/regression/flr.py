@@ -38,9 +38,8 @@ class FLR:
     """
 
     name: ClassVar[str] = "flr"
-    backends: ClassVar[tuple[str, ...]] = ("jax", "opencl")
-    margin: ClassVar[int] = 0
     images: ClassVar[Any] = staticmethod(plain_images)
+    margin: ClassVar[int] = 0
 
     sigma: jax.Array | float = 15.0
     eps: jax.Array | float = 1.3e-5

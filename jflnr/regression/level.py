@@ -9,7 +9,7 @@ import numpy as np
 from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.moments import index_xx, index_xy
-from jflnr.regression.pyramid import halve
+from jflnr.regression.resampling import halve
 from jflnr.regression.solve import solve_strips
 from jflnr.regression.window import Window, gather, gather_moments, window_over
 
@@ -90,11 +90,29 @@ class Windowed(NamedTuple):
     window: Window
 
 
-def fit_level(system: Windowed, guides: int, channels: int) -> Fit:
-    """The models of one level, of the guides alone, from `windowed`."""
+def guide_features(grid: Grid, guides: int, numbers: AdaptiveFLR) -> jax.Array:
+    """What of the guides must be alike inside a window, `(Q, h, w)`."""
+    return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
+
+
+def fit_level(
+    grid: Grid,
+    shift: jax.Array,
+    channels: int,
+    mean: jax.Array,
+    numbers: AdaptiveFLR,
+    features: jax.Array | None = None,
+    *,
+    slopes: bool = True,
+) -> Fit:
+    """The models of one level, of the guides alone. features: of the guides alone if None; the
+    rest as of `windowed`."""
+    if features is None:
+        features = guide_features(grid, shift.size, numbers)
+    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
     regular = system.eps, system.eps_prime
     coefficients = solve_strips(system.moments, system.shift, *regular, channels)
-    return Fit(coefficients[: guides + 1], system.variance, system.window)
+    return Fit(coefficients[: shift.size + 1], system.variance, system.window)
 
 
 def windowed(
@@ -128,8 +146,8 @@ def windowed(
     variance = gather(grid.noise, window.squared())[0] * inverse * inverse
     start = index_xy(0, 0, guides + positions, channels)
     colour = moments[start : start + channels] / n
-    level = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
-    relative = variance / (jnp.maximum(level, 0) ** 2 + 0.01 * mean**2)
+    luminance = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
+    relative = variance / (jnp.maximum(luminance, 0) ** 2 + 0.01 * mean**2)
     ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
 
     # Positions are centred on the window already, so only their own ridge is added.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.level import Fit, Grid, mean_guides, predict
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.resampling import double, halve
 from jflnr.regression.window import Window, gather
 
 

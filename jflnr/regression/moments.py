@@ -64,7 +64,7 @@ def centre(guides: Guides, weight: jax.Array | None = None) -> jax.Array:
     return lax.stop_gradient(jnp.stack(values) if values else jnp.zeros(0))
 
 
-def magnitude(image: jax.Array) -> jax.Array:
+def unit_of(image: jax.Array) -> jax.Array:
     """A power of two near the largest value on a sparse grid of pixels, or 1.
 
     Dividing by it rounds nothing, and squares of what is left do not overflow.

@@ -15,8 +15,6 @@ from jflnr.regression.strips import map_rows
 # Roundings that a variance, a difference of two sums, may be off by: of plain windows, and of
 # edge-aware ones, which may lie far from the shift and hold few blocks.
 ROUNDING, ROUNDING_OF_STRIPS = 8, 64
-# Blocks that are solved at a time.
-STRIP = 4096
 
 
 class NormalEquations(NamedTuple):
@@ -84,11 +82,7 @@ def normal_equations(
 
 
 def solve(
-    moments: jax.Array,
-    shift: jax.Array,
-    method: Any,
-    channels: int,
-    solver: Solver = "cholesky",
+    moments: jax.Array, shift: jax.Array, method: Any, channels: int, solver: Solver = "cholesky"
 ) -> jax.Array:
     """Coefficients of the local affine models, one per block (Appendix, Eq. 12-23).
 
@@ -124,4 +118,4 @@ def solve_strips(
         system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING_OF_STRIPS)
         return system.models(eliminate(system.correlation, system.right))
 
-    return map_rows(solve_some, (moments, eps, eps_prime), STRIP)
+    return map_rows(solve_some, (moments, eps, eps_prime))

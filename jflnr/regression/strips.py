@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-# Rows of pixels that are worked on at a time: enough to keep cores busy.
 from jflnr.lazy import jax, jnp, lax
 
+# Rows of pixels that are worked on at a time: enough to keep cores busy.
 ROWS = 16
+# Blocks of a grid that are worked on at a time, about.
+TOGETHER = 4096
 
 
 def step_of(block: int, rows: int = ROWS) -> int:
@@ -48,14 +50,14 @@ def cut(images: Any, first: jax.Array | int, rows: int) -> Any:
     return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows), images)
 
 
-def map_rows(make: Callable[[Any], Any], planes: Any, together: int) -> Any:
+def map_rows(make: Callable[[Any], Any], planes: Any) -> Any:
     """`make` of a few rows of a grid of blocks at a time.
 
     planes: pytree of `(..., h, w)`, of which `make` takes some rows and returns a pytree of such
-    planes. together: blocks at a time, about.
+    planes.
     """
     height, width = jax.tree.leaves(planes)[0].shape[-2:]
-    rows = min(max(together // width, 1), height)
+    rows = min(max(TOGETHER // width, 1), height)
 
     def some(first: jax.Array | int) -> Any:
         return jax.tree.map(lambda a: lax.dynamic_slice_in_dim(a, first, rows, a.ndim - 2), planes)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, mean_guides, predict
-from jflnr.regression.pyramid import double
-from jflnr.regression.widths import Step
+from jflnr.regression.multiscale import Step
+from jflnr.regression.resampling import double
 
 # Fitted on train and val so that 90 % of the pixels are within 1.645 standard errors. Of the
 # variance that the residuals tell: they are heavy-tailed, and neighbours share windows.

@@ -10,7 +10,7 @@ SIZE = 64
 COUNT = 2
 
 
-def find_crops(scene: Scene, size: int = SIZE, count: int = COUNT) -> list[dict[str, int]]:
+def find_crops(scene: Scene, size: int = SIZE) -> list[dict[str, int]]:
     """Squares `{"x", "y", "size"}` inside the picture, far apart, the most different first."""
     height, width = scene.size
     size = min(size, height, width)
@@ -19,7 +19,7 @@ def find_crops(scene: Scene, size: int = SIZE, count: int = COUNT) -> list[dict[
     # Only centres whose square lies inside.
     inside = spread[half : height - size + half + 1, half : width - size + half + 1]
     found = []
-    for _ in range(count):
+    for _ in range(COUNT):
         y, x = (int(i) for i in np.unravel_index(np.argmax(inside), inside.shape))
         if inside[y, x] < 0:
             break

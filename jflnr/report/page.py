@@ -116,7 +116,8 @@ def _layers(frame: Frame, unit: float) -> dict[str, str]:
 
 def _unit(scene: Scene) -> float:
     """A power of two near the mean light, so that dividing by it is exact and suits half floats."""
-    mean = _mean(_judge(scene))
+    image = _judge(scene)
+    mean = float(np.mean(np.abs(image[np.isfinite(image)]), dtype=np.float64))
     return 2.0 ** round(np.log2(mean)) if 0 < mean < np.inf else 1.0
 
 
@@ -135,10 +136,6 @@ def _exposures(scene: Scene) -> dict[str, float]:
 def _judge(scene: Scene) -> np.ndarray:
     """The version that sets the brightness for all: the reference, else the last."""
     return scene.images.get(REFERENCE, list(scene.images.values())[-1])
-
-
-def _mean(image: np.ndarray) -> float:
-    return float(np.mean(np.abs(image[np.isfinite(image)]), dtype=np.float64))
 
 
 def pack(image: np.ndarray, unit: float = 1) -> str:

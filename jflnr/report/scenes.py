@@ -129,10 +129,6 @@ def _names(paths: Sequence[Path], frame: str | None = None) -> dict[Path, str]:
     return {path: str(path) for path in paths}
 
 
-def _colours(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
-    return layouts.layer(channels, "picture", tuple("RGB"), str(path))
-
-
 def _light(channels: dict[str, np.ndarray], path: Path, layer: str) -> np.ndarray:
     if "indirect.R" not in channels:
         raise ValueError(

@@ -5,19 +5,3 @@ from jflnr.temporal.accumulate import Average, accumulate, reproject
 from jflnr.temporal.camera import camera_motion
 from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
 from jflnr.temporal.sequence import State, Temporal, start, step
-
-__all__ = [
-    "Average",
-    "Camera",
-    "State",
-    "Surface",
-    "Taps",
-    "Temporal",
-    "accumulate",
-    "camera_motion",
-    "find_taps",
-    "gather",
-    "reproject",
-    "start",
-    "step",
-]

@@ -1,7 +1,5 @@
 """Motion vectors from depth and two cameras, where the renderer wrote none."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 

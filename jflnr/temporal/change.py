@@ -5,18 +5,15 @@ the guides as the light does. So it is fitted like light, by wide windows, and w
 signal is added to the history, which thus moves with the light instead of being thrown away.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, light_of
+from jflnr.regression.adaptive import DEFAULT, light_of
 from jflnr.regression.apply import apply
-from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict
 from jflnr.regression.moments import Guides, centre, collect, collect_weighted
-from jflnr.regression.widths import guide_features
 from jflnr.regression.window import gather
 
 # Side of the blocks in pixels. Windows have a standard deviation of two of them: from one sample
@@ -84,10 +81,13 @@ def find_change(
     squares = jnp.where(weight > 0, weight * light, 0) ** 2
     grid = Grid(*collect_weighted(difference, guides, shift, weight, squares, BLOCK), BLOCK)
     count, total = collect(expected[..., None], (), shift[:0], BLOCK, weight)
-    fit = _fit(grid, shift, difference.shape[-1], numbers)
+    # Its variance is told by its residuals, which without a change are the differences themselves.
+    fit = fit_level(grid, shift, difference.shape[-1], jnp.ones(()), numbers)
     found = predict(fit.coefficients, mean_guides(grid.moments, shift.size))
-    level = total / jnp.maximum(count, 1e-12)
-    share, noise, evidence = _judge(fit, found, level, grid.moments[0] > 1e-12, evidence, caution)
+    luminance = total / jnp.maximum(count, 1e-12)
+    share, noise, evidence = _judge(
+        fit, found, luminance, grid.moments[0] > 1e-12, evidence, caution
+    )
     noise += _uncovered(known, new)
     signal = apply(share * fit.coefficients, guides, shift, BLOCK)
     noise = apply(noise[None, None], jnp.zeros((*light.shape, 0)), shift[:0], BLOCK)
@@ -110,18 +110,10 @@ def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:
     return jnp.where(mean > 0, mean, 1)
 
 
-def _fit(grid: Grid, shift: jax.Array, channels: int, numbers: AdaptiveFLR) -> Fit:
-    """Its variance is told by its residuals (as in `level.py`), which without a change are the
-    differences themselves."""
-    features = guide_features(grid, shift.size, numbers)
-    system = windowed(grid, features, shift, channels, jnp.ones(()), numbers)
-    return fit_level(system, shift.size, channels)
-
-
 def _judge(
     fit: Fit,
     found: jax.Array,
-    level: jax.Array,
+    luminance: jax.Array,
     there: jax.Array,
     evidence: Evidence,
     caution: jax.Array | float,
@@ -133,11 +125,11 @@ def _judge(
     not. Most of what is added to the history now will not be found again. The details are the more
     wrong, the more of the light is new.
 
-    found, level: `(h, w)`, brightness of the fit and of the history. there: `(h, w)`, boolean.
+    found, luminance: `(h, w)`, brightness of the fit and of the history. there: `(h, w)`, boolean.
     Returns the share and the noise, `(h, w)`, and the evidence for the next frame.
     """
-    relative = 1 / (level + DIM) ** 2
-    planes = found**2 * relative, fit.variance * relative, found**2, level**2, 0 * level + 1
+    relative = 1 / (luminance + DIM) ** 2
+    planes = found**2 * relative, fit.variance * relative, found**2, luminance**2, 0 * luminance + 1
     power, noise, new, old, count = gather(jnp.where(there, jnp.stack(planes), 0), fit.window)
     power = jnp.maximum(evidence.power + NEWEST * (power - evidence.power), 1e-12)
     noise = evidence.noise + NEWEST * (noise - evidence.noise)

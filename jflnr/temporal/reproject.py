@@ -62,12 +62,7 @@ class Taps(NamedTuple):
 
 
 def find_taps(
-    motion: Array,
-    here: Surface,
-    before: Surface,
-    *,
-    off_plane: float = OFF_PLANE,
-    same_normal: float = SAME_NORMAL,
+    motion: Array, here: Surface, before: Surface, *, off_plane: float = OFF_PLANE
 ) -> Taps:
     """The taps of every pixel.
 
@@ -78,7 +73,7 @@ def find_taps(
 
     motion: `(H, W, 2)`, pixels (x, y) from here to where this point was in the previous frame; NaN
     where that is unknown. here, before: the surfaces of both frames. off_plane: a share of the
-    depth. same_normal: a cosine.
+    depth.
     """
     height, width = motion.shape[:2]
     known = jnp.all(jnp.isfinite(motion), axis=-1)
@@ -96,12 +91,13 @@ def find_taps(
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         pixel = jnp.where(inside, row * width + column, 0).astype(jnp.int32)
         there = jax.tree.map(lambda image: _take(image, pixel), before)
-        accepted = known & inside & _alike(here, there, tolerance, same_normal)
+        accepted = known & inside & _alike(here, there, tolerance)
         share = (1 - jnp.abs(x - column)) * (1 - jnp.abs(y - row))
         return pixel, jnp.where(accepted, share, 0)
 
     pixel, weight = zip(*(tap(dx, dy) for dy in (0, 1) for dx in (0, 1)), strict=True)
-    return Taps(jnp.stack(pixel, axis=-1), _shares(jnp.stack(weight, axis=-1)))
+    pixels, weights = jnp.stack(pixel, axis=-1), jnp.stack(weight, axis=-1)
+    return Taps(pixels, divide(weights, jnp.sum(weights, axis=-1, keepdims=True)))
 
 
 def gather(taps: Taps, image: Array) -> jax.Array:
@@ -120,17 +116,12 @@ def _take(image: Array, pixel: jax.Array) -> jax.Array:
     return jnp.asarray(image).reshape(-1, image.shape[-1])[pixel]
 
 
-def _alike(here: Surface, there: Surface, tolerance: jax.Array, same_normal: float) -> jax.Array:
+def _alike(here: Surface, there: Surface, tolerance: jax.Array) -> jax.Array:
     """Whether both show one surface, `(H, W)`. tolerance: `(H, W)`, in scene units."""
     if here.position is None or there.position is None:
         apart = (there.depth - here.depth)[..., 0]
     else:
         apart = jnp.sum(here.normal * (there.position - here.position), axis=-1)
-    turned = jnp.sum(here.normal * there.normal, axis=-1) < same_normal
+    turned = jnp.sum(here.normal * there.normal, axis=-1) < SAME_NORMAL
     hit = (here.depth > 0) & (there.depth > 0)
     return (jnp.abs(apart) <= tolerance) & ~turned & hit[..., 0]
-
-
-def _shares(weight: jax.Array) -> jax.Array:
-    """The weights over their sum, or 0."""
-    return divide(weight, jnp.sum(weight, axis=-1, keepdims=True))

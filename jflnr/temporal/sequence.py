@@ -4,8 +4,6 @@ The noisy light is averaged over time, the spatial method fits the average, and 
 averaged again. What the light has become since is found first and added to both averages.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -37,6 +35,9 @@ class Temporal(NamedTuple):
     caution: float = 3.5
 
 
+PAST = Temporal()
+
+
 class State(NamedTuple):
     """What one frame leaves to the next, a pytree of arrays.
 
@@ -64,7 +65,7 @@ def step(
     method: Any = None,
     *,
     guides: Sequence[str] | None = None,
-    temporal: Temporal | None = None,
+    temporal: Temporal = PAST,
     **options: Any,
 ) -> tuple[State, jax.Array]:
     """Denoise the next frame of a sequence.
@@ -78,8 +79,8 @@ def step(
     """
     method, names, inputs = prepared(state, frame, method, guides, options)
     surface = jax.tree.map(jnp.asarray, Surface.of(frame))
-    past = temporal or Temporal()
-    light, image, evidence, shown = _step(state, inputs, frame.motion, surface, method, past, names)
+    images = inputs, frame.motion, surface
+    light, image, evidence, shown = _step(state, *images, method, temporal, names)
     # The surface and the image twice would be copied if the program returned them.
     return State(surface, light, image, evidence), image.mean if shown is None else shown
 

@@ -13,32 +13,21 @@
 // and accepted (H, W). surface: above 0 where samples count. before_...: of the previous frame; where
 // its count is 0 nothing is taken from it. accepted: bit i for tap i, for phase III.
 kernel void accumulate_light(
-    int width, int height, float off_plane, float same_normal, float least,
-    global const float *sample, global const float *surface, global const float *motion,
-    global const float *normal, global const float *depth, global const float *position,
-    global const float *before_normal, global const float *before_depth,
-    global const float *before_position, global const float *before_count,
+    int width, int height, SURFACE_PARAMETERS, float least, global const float *sample,
+    global const float *surface, global const float *before_count,
     global const float *before_light, global float *light, global float *count,
     global uchar *accepted)
 {
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
     const long pixel = (long)y * width + x;
-    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
-    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
-
-    const Surface here = surface_here(normal, depth, position, pixel);
-    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
-    const real tolerance = (off_plane + moved) * here.depth;
+    Taps taps = surface_taps(x, y, width, height, SURFACES);
     mask accepts = 0;
     real samples = 0;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const Surface there =
-            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
         const real known = at(before_count, 1, 0, taps.pixel[i]);
-        const mask accept =
-            alike(here, there, tolerance, same_normal) & (known > 0) & (taps.weight[i] > 0);
+        const mask accept = (known > 0) & (taps.weight[i] > 0);
         taps.weight[i] = accept ? taps.weight[i] : (real)0;
         accepts |= accept ? (mask)(1 << i) : (mask)0;
         samples += taps.weight[i] * known;

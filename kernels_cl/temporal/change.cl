@@ -15,7 +15,7 @@
 // brightness: grids as in grids.h, of K + 1 planes and one. moments: (K of C = 5, h, from_pitch).
 kernel void arrange(
     int h, int w, int pitch, int from_pitch, global const float *moments, global float *grid,
-    global float *level)
+    global float *luminance)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= pitch || y >= h) return;
@@ -28,7 +28,7 @@ kernel void arrange(
         for (int c = 0; c < 3; ++c) to[XY(i, c) * GROUP] = FROM_XY(i, c);
     to[K * GROUP] = FROM_XY(0, 3);
     const float count = FROM(0);
-    level[AT(x, y, pitch, 1)] = FROM_XY(0, 4) / MAX(count, 1e-12f);
+    luminance[AT(x, y, pitch, 1)] = FROM_XY(0, 4) / MAX(count, 1e-12f);
 }
 
 // What is averaged over the windows, five planes: the fit's squared brightness and its variance, both
@@ -36,7 +36,7 @@ kernel void arrange(
 #define PLANES 5
 kernel void measure(
     int h, int pitch, float dim, float guide_scale, global const float *moments,
-    global const float *features, global const float *models, global const float *level,
+    global const float *features, global const float *models, global const float *luminance,
     global float *planes)
 {
     GLOBAL_BLOCK
@@ -46,7 +46,7 @@ kernel void measure(
     real found = READ(models + LIGHT_PLANE(0) * GROUP);
     for (int q = 0; q < Q; ++q)
         found += READ(features + q * GROUP) / guide_scale * READ(models + LIGHT_PLANE(q + 1) * GROUP);
-    const real old = READ(level + AT(x, y, pitch, 1)), relative = 1 / ((old + dim) * (old + dim));
+    const real old = READ(luminance + AT(x, y, pitch, 1)), relative = 1 / ((old + dim) * (old + dim));
     const mask there = READ(moments + AT(x, y, pitch, K + 1)) > 1e-12f;
     const real values[PLANES] = {
         found * found * relative, READ(models + VARIANCE * GROUP) * relative, found * found,

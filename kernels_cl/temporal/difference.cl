@@ -63,15 +63,15 @@ kernel void difference(
         values[c] = (OWN(sample, c) - OWN(light, c)) * per_unit;
         l += BRIGHTNESS(c) * values[c];
     }
-    real level = READ(expected + pixel) * per_unit;
-    level = MAX(level, 0);
+    real luminance = READ(expected + pixel) * per_unit;
+    luminance = MAX(luminance, 0);
     const mask usable = 0 * l == 0;
-    real w = READ(known + pixel) / (level + offset);
+    real w = READ(known + pixel) / (luminance + offset);
     w = usable ? w : (real)0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) values[c] = usable ? values[c] : (real)0;
     values[3] = usable ? w * l * l : (real)0;
-    values[4] = level;
+    values[4] = luminance;
     write_pixels(target + pixel * 5, values, 0, WIDTH - 1);
     WRITE(w, weight + pixel);
 }

@@ -24,10 +24,7 @@ INLINE real move(
 // (H, W). surface: above 0 where samples count. expected: brightness of the image there. known: 1
 // where samples count and there is a history, else 0.
 kernel void reproject(
-    int width, int height, float off_plane, float same_normal, global const float *surface,
-    global const float *motion, global const float *normal, global const float *depth,
-    global const float *position, global const float *before_normal,
-    global const float *before_depth, global const float *before_position,
+    int width, int height, SURFACE_PARAMETERS, global const float *surface,
     global const float *light, global const float *light_samples, global const float *image,
     global const float *image_samples, global float *moved_light, global float *moved_light_samples,
     global float *moved_image, global float *moved_image_samples, global float *expected,
@@ -36,18 +33,7 @@ kernel void reproject(
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
     const long pixel = (long)y * width + x;
-    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
-    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
-    const Surface here = surface_here(normal, depth, position, pixel);
-    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
-    const real tolerance = (off_plane + moved) * here.depth;
-#pragma unroll
-    for (int i = 0; i < 4; ++i) {
-        const Surface there =
-            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
-        const mask accept = alike(here, there, tolerance, same_normal);
-        taps.weight[i] = accept ? taps.weight[i] : (real)0;
-    }
+    Taps taps = surface_taps(x, y, width, height, SURFACES);
     normalise(&taps);
 
     real found[3], brightness = 0;

@@ -50,3 +50,33 @@ INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal
     const mask turned = DOT(here.normal, there.normal) < same_normal;
     return (ABS(apart) <= tolerance) & (turned == 0) & (here.depth > 0) & (there.depth > 0);
 }
+
+// What taps follow from, as kernel arguments and handed on.
+#define SURFACE_PARAMETERS                                                        \
+    float off_plane, float same_normal, global const float *motion,               \
+        global const float *normal, global const float *depth,                    \
+        global const float *position, global const float *before_normal,          \
+        global const float *before_depth, global const float *before_position
+#define SURFACES                                                                  \
+    off_plane, same_normal, motion, normal, depth, position, before_normal, before_depth, \
+        before_position
+
+// The taps of the pixels from (x, y), with weight 0 for those of other surfaces; not divided by their
+// sum.
+INLINE Taps surface_taps(int x, int y, int width, int height, SURFACE_PARAMETERS)
+{
+    const long pixel = (long)y * width + x;
+    const real motion_x = OWN(motion, 2, 0), motion_y = OWN(motion, 2, 1);
+    const Surface here = surface_here(normal, depth, position, pixel);
+    Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
+    const real moved = MAX(ABS(motion_x), ABS(motion_y)) / width;
+    const real tolerance = (off_plane + moved) * here.depth;
+#pragma unroll
+    for (int i = 0; i < 4; ++i) {
+        const Surface there =
+            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
+        const mask accept = alike(here, there, tolerance, same_normal);
+        taps.weight[i] = accept ? taps.weight[i] : (real)0;
+    }
+    return taps;
+}

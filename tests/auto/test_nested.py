@@ -72,13 +72,6 @@ def test_a_group_that_is_noise_leaves_the_model_before_it(pixels):
     np.testing.assert_array_equal(found.coefficients[4], 0)
 
 
-def test_fewer_guides_are_a_part_of_the_same_moments(pixels):
-    x, y = pixels
-    kept = [3, 0]
-    found, wanted = collected(x, y).of_guides(kept), collected(x[:, kept], y)
-    np.testing.assert_allclose(found.moments, wanted.moments, rtol=1e-6)
-
-
 def test_residual_from_moments_is_that_of_the_pixels(pixels):
     x, y = pixels
     model = np.array([1.5, 0.2, -0.1, 0.3, 0.4])

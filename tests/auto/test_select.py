@@ -8,7 +8,7 @@ import pytest
 import jflnr
 from jflnr.auto import plan as plans
 from jflnr.auto.collected import hold
-from jflnr.auto.glance import is_simple
+from jflnr.auto.complexity import is_simple
 from jflnr.auto.method import denoise_on_blocks
 from jflnr.auto.plan import choose
 
@@ -95,13 +95,21 @@ def test_choice():
     forms = plans.FORMS
     decibels = dict(zip(forms, (20.0, 21.0, 21.5, 21.6), strict=True))
     ms = dict(zip(forms, (10.0, 14.0, 40.0, 45.0), strict=True))
-    assert choose(decibels, plans.COSTS, ms, None, 20.5) == "blocks-8"
-    assert choose(decibels, plans.COSTS, ms, None, 30.0) == "flnr"
-    assert choose(decibels, plans.COSTS, ms, 42.0, None) == "blocks-4"
-    assert choose(decibels, plans.COSTS, ms, 15.0, 30.0) == "blocks-8"
-    assert choose(decibels, plans.COSTS, ms, 1.0, None) == "blocks-16"
-    assert choose({"blocks-8": 21.0, "flnr": 30.0}, plans.COSTS, None, None, None) == "flnr"
-    assert choose({"blocks-8": 21.0, "flnr": 21.01}, plans.COSTS, None, None, None) == "blocks-8"
+    for budget_ms, target_db, wanted in (
+        (None, 20.5, "blocks-8"),
+        (None, 30.0, "flnr"),
+        (42.0, None, "blocks-4"),
+        (15.0, 30.0, "blocks-8"),
+        (1.0, None, "blocks-16"),
+    ):
+        limits = plans.Limits(budget_ms, target_db)
+        assert choose("blocks-16", decibels, plans.COSTS, ms, limits) == wanted
+    for more, wanted in ((21.01, "blocks-8"), (30.0, "blocks-4")):
+        decibels = {"blocks-8": 21.0, "blocks-4": more, "flnr": 40.0}
+        assert choose("blocks-8", decibels, plans.COSTS, None, plans.Limits()) == wanted
+    assert choose("blocks-16", dict.fromkeys(forms, 21.0), plans.COSTS, None, plans.Limits()) == (
+        "blocks-16"
+    )
 
 
 def test_a_tight_budget_begins_with_the_smallest_form():

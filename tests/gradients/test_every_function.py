@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from jax import random
 
+from experiments.peers import paper_network as paper
 from jflnr.auto import nested
 from jflnr.bmfr import fit as bmfr_fit
 from jflnr.bmfr import pipeline as bmfr
@@ -13,13 +14,12 @@ from jflnr.bmfr import taa as bmfr_taa
 from jflnr.frame import Frame, composite
 from jflnr.images.noisy_guides import smooth_guide
 from jflnr.network import flnr as networks
-from jflnr.network import paper
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.elimination import cholesky_solve
 from jflnr.regression.energy import rescale, restore
 from jflnr.regression.flr import FLR
 from jflnr.regression.moments import collect, collect_weighted, plane_count
-from jflnr.regression.pyramid import double, halve
+from jflnr.regression.resampling import double, halve
 from jflnr.regression.solve import solve, solve_strips
 from jflnr.regression.window import gather_moments, window_over
 from jflnr.temporal import (
@@ -75,7 +75,7 @@ STEPS = {
         lambda f, sigma, m: gather_moments(m, window_over(f, sigma), 1.3, 2, 1),
         (normal(2, 4, 5), 1.5, normal(plane_count(2, 1), 4, 5)),
     ),
-    "pyramid": (lambda p: double(halve(p), 5, 7), (normal(2, 5, 7),)),
+    "resampling": (lambda p: double(halve(p), 5, 7), (normal(2, 5, 7),)),
     "strips": (
         lambda m, e, p: solve_strips(m, jnp.asarray(SHIFT), e, p, 2),
         (moments_of(2, 2, 2, 3), positive(2, 3), positive(2, 3)),

@@ -109,14 +109,14 @@ def test_time_counts_from_the_first_step(records, settings, monkeypatch):
     """The clock here is moved by the updates: by the first one, which compiles, an hour."""
     moves = [1.0, 1.0, 1.0, 3600.0]
     clock = [0.0]
-    real = train._update()
+    real = train._update
 
     def update(*given):
         clock[0] += moves.pop()
         return real(*given)
 
     compiled = real._cache_size()
-    monkeypatch.setattr(train, "_update", lambda: update)
+    monkeypatch.setattr(train, "_update", update)
     monkeypatch.setattr(train.time, "monotonic", lambda: clock[0])
     assert train.train(records, [], settings, seconds=3).best.step == 3
     assert real._cache_size() <= compiled + 1

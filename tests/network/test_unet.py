@@ -35,13 +35,6 @@ def test_gains_are_those_of_plain_numpy(rng, params, size):
     np.testing.assert_allclose(ours, network_numpy.gains(params, *images), rtol=1e-9)
 
 
-def test_multiply_adds_are_those_of_the_layers():
-    params = unet.init(jax.random.key(0), 2, 1, (3, 5), 3)
-    half = (8 + 1) * 3 + 9 * 3 * 3 + 9 * 3 * 3 + 9 * 3 * 3 + 3 * 12
-    quarter = 9 * 3 * 5 + 9 * (5 + 1) * 5 + 5 * 3
-    assert unet.multiply_adds(params) == half / 4 + quarter / 16
-
-
 def test_unpacking_undoes_packing(rng):
     image = jnp.asarray(rng.standard_normal((4, 6, 3)))
     np.testing.assert_array_equal(unet.unpack(unet.pack(image)), image)

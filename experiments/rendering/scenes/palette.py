@@ -70,10 +70,7 @@ def textured(
 def wall(rng: np.random.Generator) -> Material:
     """Paint in most cases, else wallpaper, bricks, tiles or stone."""
     colour = vivid(rng) if rng.random() < 0.25 else pale(rng)
-    if rng.random() < 0.45:
-        return plain(colour)
-    texture = textures.WALLS[int(rng.integers(len(textures.WALLS)))]
-    return textured(rng, texture, colour, rng.uniform(0.8, 2.0))
+    return plain_or(rng, 0.45, colour, textures.WALLS, (0.8, 2.0))
 
 
 def floor(rng: np.random.Generator) -> Material:
@@ -84,10 +81,20 @@ def floor(rng: np.random.Generator) -> Material:
 
 def fabric(rng: np.random.Generator) -> Material:
     colour = vivid(rng) if rng.random() < 0.5 else any_colour(rng)
-    if rng.random() < 0.4:
+    return plain_or(rng, 0.4, colour, textures.FABRICS, (0.3, 1.0))
+
+
+def plain_or(
+    rng: np.random.Generator,
+    share: float,
+    colour: Array,
+    choice: Sequence[textures.Texture],
+    sizes: tuple[float, float],
+) -> Material:
+    """Plain in a share of cases, else one of several textures, of a size between two."""
+    if rng.random() < share:
         return plain(colour)
-    texture = textures.FABRICS[int(rng.integers(len(textures.FABRICS)))]
-    return textured(rng, texture, colour, rng.uniform(0.3, 1.0))
+    return textured(rng, choice[int(rng.integers(len(choice)))], colour, rng.uniform(*sizes))
 
 
 def timber(rng: np.random.Generator) -> Material:

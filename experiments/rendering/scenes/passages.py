@@ -8,15 +8,7 @@ import numpy as np
 
 from experiments.rendering.scenes import furniture, palette
 from experiments.rendering.scenes.furniture import placed
-from experiments.rendering.scenes.geometry import (
-    box,
-    cylinder,
-    join,
-    quad,
-    rotation,
-    sphere,
-    tube,
-)
+from experiments.rendering.scenes.geometry import box, cylinder, join, quad, rotation, sphere, tube
 from experiments.rendering.scenes.shell import Opening, daylight, shell, sides, window
 from experiments.rendering.scenes.world import Material, World, plain
 

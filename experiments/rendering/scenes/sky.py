@@ -39,3 +39,16 @@ def sky(
         warm = np.array([1.0, 0.6 + 0.35 * np.sin(height), 0.35 + 0.5 * np.sin(height)])
         picture = picture + glow * warm * rng.uniform(1.0, 2.5) / spread**2
     return (picture * 10 ** rng.uniform(-0.3, 0.7)).astype(np.float32)
+
+
+def gradient(rng: np.random.Generator, rows: int = 64) -> NDArray[np.float32]:
+    """A studio's map, `(rows, 2 * rows, 3)`: from one colour to another, with soft boxes."""
+    up = np.linspace(0, 1, rows)[:, None, None] * np.ones((1, 2 * rows, 1))
+    picture = rng.uniform(0.05, 1, 3) * (1 - up) + rng.uniform(0.02, 0.6, 3) * up
+    row, column = np.mgrid[:rows, : 2 * rows]
+    for _ in range(int(rng.integers(1, 5))):
+        place, half = rng.uniform([0, 0], [0.6 * rows, 2 * rows]), rng.uniform(0.02, 0.15, 2) * rows
+        around = np.abs((column - place[1] + rows) % (2 * rows) - rows)
+        inside = (np.abs(row - place[0]) < half[0]) & (around < half[1])
+        picture[inside] += rng.uniform(0.8, 1.2, 3) * 10 ** rng.uniform(0.3, 1.5)
+    return (picture * 10 ** rng.uniform(-0.3, 0.5)).astype(np.float32)

@@ -15,11 +15,31 @@ from experiments.rendering.scenes.geometry import Mesh
 
 
 @dataclass(frozen=True)
+class Finish:
+    """What a surface does besides reflecting diffusely: `diffuse`, `principled`, `plastic` (under a
+    smooth coat), `metal`, or `glass` (solid) and `pane` (thin), which transmit.
+
+    `alpha` is the GGX roughness, 0 for mirrors and clear glass, 1 for none; `tint` (3,) colours
+    metals and glass, whose textures do not count.
+    """
+
+    kind: str = "diffuse"
+    alpha: float = 1.0
+    metallic: float = 0.0
+    coat: float = 0.0
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+DIFFUSE = Finish()
+
+
+@dataclass(frozen=True)
 class Material:
     """Diffuse reflectance: a texture `(h, w, 3)`, linear, repeated every `size` metres."""
 
     texture: NDArray[np.float32]
     size: float = 1.0
+    finish: Finish = DIFFUSE
 
 
 def plain(colour: ArrayLike) -> Material:

@@ -1,7 +1,5 @@
 """Whether a scene is simple, from a sparse grid of its pixels, before any pass over all of them."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 
@@ -12,8 +10,6 @@ STEP = 8
 # Neighbours of the grid are on one surface if their normals and their depths differ by less, the
 # depths as a share of the nearer one.
 TURN, GAP = 0.3, 0.1
-
-
 # A simple scene shows no more edges than this, and light that varies no more: its standard
 # deviation in that of its mean, with the noise. Chosen on training frames (docs/select.md).
 EDGES, SPREAD = 0.12, 4.0
@@ -40,15 +36,12 @@ def _is_calm(light: jax.Array) -> jax.Array:
 
 
 def _edges(normal: jax.Array, depth: jax.Array) -> jax.Array:
-    """Share of neighbours on the grid between which one surface ends and another begins."""
-    found = jnp.concatenate([_ends(normal, depth, axis).ravel() for axis in (0, 1)])
-    return jnp.sum(found) / max(found.size, 1)
-
-
-def _ends(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
-    """Where neighbours along an axis differ, one fewer along it; pixels that are not finite do."""
-    if axis == 1:
-        normal, depth = normal.swapaxes(0, 1), depth.T
-    turn = jnp.sum((normal[1:] - normal[:-1]) ** 2, axis=-1)
-    here, there = depth[:-1], depth[1:]
-    return ~(turn <= TURN**2) | ~(jnp.abs(there - here) <= GAP * jnp.minimum(here, there))
+    """Share of neighbours on the grid between which one surface ends and another begins; pixels
+    that are not finite are no surface."""
+    found = []
+    for n, d in ((normal, depth), (normal.swapaxes(0, 1), depth.T)):
+        turn, here, there = jnp.sum((n[1:] - n[:-1]) ** 2, axis=-1), d[:-1], d[1:]
+        step = jnp.abs(there - here)
+        found.append(~(turn <= TURN**2) | ~(step <= GAP * jnp.minimum(here, there)))
+    ends = jnp.concatenate([some.ravel() for some in found])
+    return jnp.sum(ends) / max(ends.size, 1)

@@ -1,6 +1,4 @@
-"""Host side of kernels_cl/pyramid.cl; its twin in JAX is jflnr/regression/pyramid.py."""
-
-from __future__ import annotations
+"""Host side of kernels_cl/resampling.cl; its twin in JAX is jflnr/regression/resampling.py."""
 
 from typing import Any
 
@@ -28,5 +26,5 @@ def _halve(
 ) -> Grid:
     """strides: from one row, group of neighbours and plane to the next."""
     arguments = (halves.number, *size, *strides, *halves.size, planes, halves.planes)
-    run.launch("halve", "pyramid.cl", halves, arguments)
+    run.launch("halve", "resampling.cl", halves, arguments)
     return halves

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from jflnr.lazy import jax, jnp
-from jflnr.regression.level import Fit, Grid, fit_level, mean_guides, predict, windowed
+from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
 from jflnr.regression.merge import interpolate, signal_share
-from jflnr.regression.pyramid import double
+from jflnr.regression.resampling import double
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 class Step(NamedTuple):
     """One level finer than what was known before.
 
-    fine: its fit. coarse: that of the coarser level, on this grid. level: `(h, w)`, brightness
+    fine: its fit. coarse: that of the coarser level, on this grid. luminance: `(h, w)`, brightness
     known before. share: `(h, w)`, how much of their difference is signal. merged: models
     `(Q + 1, C, h, w)` with that share added.
     """
@@ -26,7 +25,7 @@ class Step(NamedTuple):
     grid: Grid
     fine: Fit
     coarse: Fit
-    level: jax.Array
+    luminance: jax.Array
     share: jax.Array
     merged: jax.Array
 
@@ -37,53 +36,23 @@ def merged_models(coarsest: Fit, steps: list[Step]) -> jax.Array:
 
 
 def fit_levels(
-    grid: Grid,
-    shift: jax.Array,
-    channels: int,
-    levels: int,
-    mean: jax.Array,
-    numbers: AdaptiveFLR,
+    grid: Grid, shift: jax.Array, channels: int, levels: int, mean: jax.Array, numbers: AdaptiveFLR
 ) -> tuple[Fit, list[Step]]:
     """The fit of the coarsest grid, and the steps from there to the finest."""
     grids = grid.pyramid(levels)
-    coarsest = _fit(grids[-1], True, shift, channels, mean, numbers)
-    last, steps = (coarsest, coarsest.coefficients), list[Step]()
-    for grid in reversed(grids[:-1]):
+
+    def fit(grid: Grid, features: jax.Array, coarse: Fit) -> Fit:
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
         slopes = grid is not grids[0]
+        return fit_level(grid, shift, channels, mean, numbers, features, slopes=slopes)
 
-        fit = functools.partial(_fit, grid, slopes, shift, channels, mean, numbers)
+    coarsest = fit_level(grids[-1], shift, channels, mean, numbers)
+    last, steps = (coarsest, coarsest.coefficients), list[Step]()
+    for grid in reversed(grids[:-1]):
         steps.append(refine(grid, *last, shift.size, mean, numbers, fit))
         last = steps[-1].fine, steps[-1].merged
     return coarsest, steps
-
-
-class Known(NamedTuple):
-    """What a grid knows before its own fit.
-
-    coarse: the fit of the coarser grid, on this one. level: `(h, w)`, brightness found so far.
-    features: `(F, h, w)`, what must be alike in a window.
-    """
-
-    coarse: Fit
-    level: jax.Array
-    features: jax.Array
-
-
-def _fit(
-    grid: Grid,
-    slopes: bool,
-    shift: jax.Array,
-    channels: int,
-    mean: jax.Array,
-    numbers: AdaptiveFLR,
-    known: Known | None = None,
-) -> Fit:
-    """The fit of one grid; `known` but of the coarsest."""
-    features = guide_features(grid, shift.size, numbers) if known is None else known.features
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
-    return fit_level(system, shift.size, channels)
 
 
 def refine(
@@ -93,25 +62,21 @@ def refine(
     guides: int,
     mean: jax.Array,
     numbers: AdaptiveFLR,
-    fit: Callable[[Known], Fit],
+    fit: Callable[[Grid, jax.Array, Fit], Fit],
 ) -> Step:
     """One level finer: its own fit, and what is merged so far with its share added.
 
-    coarse, merged: of the coarser grid. fit: makes the models of this one.
+    coarse, merged: of the coarser grid. fit: makes the models of this one, from what must be alike
+    inside a window, `(F, h, w)`, and the coarser fit on this grid.
     """
     size, window = grid.moments.shape[1:], coarse.window
     coarse, merged = interpolate(coarse, *size), double(merged, *size)
-    level = jnp.maximum(predict(merged, mean_guides(grid.moments, guides)), 0)
+    luminance = jnp.maximum(predict(merged, mean_guides(grid.moments, guides)), 0)
     # Windows end where what is known so far of the brightness changes.
-    edge = numbers.brightness_scale * jnp.log(level / mean + 0.1)
+    edge = numbers.brightness_scale * jnp.log(luminance / mean + 0.1)
     features = jnp.concatenate([guide_features(grid, guides, numbers), edge[None]])
-    fine = fit(Known(coarse, level, features))
-    reference = level**2 + 0.01 * mean**2
+    fine = fit(grid, features, coarse)
+    reference = luminance**2 + 0.01 * mean**2
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
     merged = merged + share * (fine.coefficients - coarse.coefficients)
-    return Step(grid, fine, coarse, level, share, merged)
-
-
-def guide_features(grid: Grid, guides: int, numbers: AdaptiveFLR) -> jax.Array:
-    """What of the guides must be alike inside a window, `(Q, h, w)`."""
-    return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
+    return Step(grid, fine, coarse, luminance, share, merged)

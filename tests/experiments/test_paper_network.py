@@ -5,8 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jflnr.network import paper
+from experiments.peers import paper_network as paper
 from jflnr.regression.flr import DEFAULT, flr
+from tests.network.conftest import scene_of
 
 WIDTHS = (2, 3, 4)
 
@@ -32,8 +33,8 @@ def test_the_layers_are_those_of_section_3_3(params):
     assert shapes["out3"] == (3, 3, 2, 2) and shapes["out1"] == (1, 1, 2, 10)
 
 
-def test_scales_with_the_light_and_is_flr_on_the_guides_it_makes(params, scene):
-    target, guides = (jnp.asarray(a[:24, :32]) for a in scene)
+def test_scales_with_the_light_and_is_flr_on_the_guides_it_makes(params):
+    target, guides = (jnp.asarray(a[:24, :32]) for a in scene_of(37, 50))
     once = paper.flnr_of_paper(target, guides, params, DEFAULT, block=8, support=24)
     more = paper.flnr_of_paper(100 * target, guides, params, DEFAULT, block=8, support=24)
     np.testing.assert_allclose(more, 100 * once, rtol=1e-3, atol=1e-2)
@@ -43,9 +44,9 @@ def test_scales_with_the_light_and_is_flr_on_the_guides_it_makes(params, scene):
     np.testing.assert_allclose(once, plain, rtol=1e-4, atol=1e-5)
 
 
-def test_network_and_regularisation_are_learned_together(params, scene):
+def test_network_and_regularisation_are_learned_together(params):
     """A step against the gradient brings the light nearer to what it should be."""
-    target, guides = (jnp.asarray(a[:24, :32]) for a in scene)
+    target, guides = (jnp.asarray(a[:24, :32]) for a in scene_of(37, 50))
     wanted = jnp.mean(target, axis=(0, 1)) * (1 + guides[..., :1])
 
     def loss(both):
