@@ -34,12 +34,13 @@ def find_detail(
     noisy, fitted: `(H, W, 3)`. weight: `(H, W)`, how much each pixel counts, 0 to 1; one that is
     not finite does not. unit: mean brightness of the picture, `(1, 1, 1)` or of its size.
     """
+    unit = jnp.maximum(unit, 1e-12)
     scale = jnp.mean(fitted, axis=-1, keepdims=True) + DARK * unit
     left = jnp.stack(planes((noisy - fitted) / scale))
     usable = jnp.all(jnp.isfinite(left), axis=0)
     left = jnp.where(usable, left * weight, 0)
     follow = jnp.concatenate([left, jnp.mean(left**2, axis=0, keepdims=True)])
-    steer = jnp.stack(planes(jnp.log1p(fitted / unit)))
+    steer = jnp.where(usable, jnp.stack(planes(jnp.log1p(fitted / unit))), 0)
     number, (*mean, square) = average(steer, follow, usable, ALIKE)
     detail = jnp.stack(mean, axis=-1)
     signal = jnp.mean(detail**2, axis=-1)

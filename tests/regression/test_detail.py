@@ -56,6 +56,11 @@ def test_pixels_that_do_not_count_do_not(rng):
     assert np.isfinite(result).all() and np.max(result) < 3
 
 
+def test_darkness_has_no_detail():
+    dark = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    assert np.all(found(dark, dark, everything(), 0 * UNIT) == 0)
+
+
 def test_it_is_told_from_nearby_alone(rng):
     noisy, fitted, _ = noisy_and_flat(rng, 0.6)
     cut = 2 * detail.BLOCK
