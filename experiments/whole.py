@@ -5,33 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
+import jflnr
 from experiments import data, plots, results
 from jflnr.exr import read_channels
-from jflnr.frame import Array
-from jflnr.images.guides import draw_near, typical_depth
+from jflnr.frame import Array, Frame
 from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
-from jflnr.regression.picture import Picture, denoise_picture
 
 NAME = "whole"
 QUESTION = "How near does a whole picture come to Open Image Denoise?"
 MINUTES = 15
 
-# Passes of Blender before 5.0.
-PASSES = {
-    "beauty": ("Combined", "RGB"),
-    "albedo": ("Denoising Albedo", "RGB"),
-    "normal": ("Normal", "XYZ"),
-    "seen_normal": ("Denoising Normal", "XYZ"),
-    "depth": ("Depth", "Z"),
-    "position": ("Position", "XYZ"),
-    "emission": ("Emit", "RGB"),
-    "environment": ("Env", "RGB"),
-    "alpha": ("Combined", "A"),
-}
-FARTHEST = 1e9
 SAMPLES = 1, 4, 16, 64
 
 
@@ -49,9 +34,9 @@ def run(quick: bool) -> dict[str, Any]:
         for spp in (4,) if quick else SAMPLES:
             if not (folder / f"{spp}spp.exr").exists():
                 continue
-            picture = read(folder / f"{spp}spp.exr")
+            frame = jflnr.read_frame(folder / f"{spp}spp.exr")
             row: dict[str, Any] = {"spp": spp, "picture": folder.name}
-            for name, image in images(picture, spp).items():
+            for name, image in images(frame).items():
                 row |= {f"{name}_{key}": x for key, x in metrics(image, *halves).items()}
             print("  {picture}, {spp} spp: {ours_psnr:.2f} dB, OIDN {clean_psnr:.2f}".format(**row))
             rows.append(row)
@@ -70,24 +55,6 @@ def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
-def read(path: Path) -> Picture:
-    """A picture as Blender writes it, its lengths over the median depth."""
-    channels = read_channels(path)
-    view = next(name for name in channels if name.endswith("Combined.R"))[: -len("Combined.R")]
-    layers: dict[str, Any] = {
-        layer: np.stack([np.float32(channels[f"{view}{name}.{c}"]) for c in components], axis=-1)
-        for layer, (name, components) in PASSES.items()
-    }
-    there = (layers["depth"] > 0) & (layers["depth"] < FARTHEST)
-    unit = np.asarray(typical_depth(layers["depth"], there))
-    middle = np.median(layers["position"][there[..., 0]], axis=0)
-    layers["depth"] = np.asarray(draw_near(np.minimum(layers["depth"], FARTHEST) / unit))
-    layers["position"] = np.where(there, (layers["position"] - middle) / unit, 0)
-    if np.all(layers["alpha"] == 1):
-        del layers["alpha"]
-    return Picture(**layers)
-
-
 def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Two independent halves."""
     channels = read_channels(path)
@@ -98,23 +65,25 @@ def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return first, 2 * whole - first
 
 
-def images(picture: Picture, spp: int) -> dict[str, Array]:
+def images(frame: Frame) -> dict[str, Array]:
     """Noisy, ours, and OIDN with auxiliaries as they are and prefiltered."""
-    albedo, normal = np.clip(picture.albedo, 0, 1), picture.seen_normal
     return {
-        "noisy": picture.beauty,
-        "ours": np.asarray(jax.jit(denoise_picture)(picture, samples=float(spp)).beauty),
-        "raw": oidn(color=picture.beauty, albedo=albedo, normal=normal),
-        "clean": best_of_oidn(picture),
+        "noisy": frame.beauty,
+        "ours": jflnr.denoise(frame)[..., :3],
+        "raw": oidn(color=frame.beauty, **auxiliaries(frame)),
+        "clean": best_of_oidn(frame),
     }
 
 
-def best_of_oidn(picture: Picture) -> np.ndarray:
+def best_of_oidn(frame: Frame) -> np.ndarray:
     """OIDN with prefiltered auxiliaries, `(H, W, 3)`."""
-    albedo = oidn(albedo=np.clip(picture.albedo, 0, 1))
-    return oidn(
-        color=picture.beauty, albedo=albedo, normal=oidn(normal=picture.seen_normal), cleanAux=True
-    )
+    clean = {name: oidn(**{name: layer}) for name, layer in auxiliaries(frame).items()}
+    return oidn(color=frame.beauty, **clean, cleanAux=True)
+
+
+def auxiliaries(frame: Frame) -> dict[str, Any]:
+    """What OIDN reads besides the colour."""
+    return {"albedo": np.clip(np.asarray(frame.seen_albedo), 0, 1), "normal": frame.seen_normal}
 
 
 def oidn(*, cleanAux: bool = False, **layers: Any) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -53,12 +53,11 @@ class Frame:
     seen_normal: Array | None = None  # (H, W, 3) likewise
     lobes: Array | None = None  # (H, W, 6 n) direct and indirect light of n kinds of surfaces
     lobe_colours: Array | None = None  # (H, W, 3 n) what that is to be multiplied by
-    # Samples per pixel that all layers of a whole picture are means of; None where nobody says.
-    samples: Any = field(default=None, metadata={"layer": False})
+    samples: Array | None = None  # (H, W, 1) that these are means of; 0 where nobody says how many
 
     def layers(self) -> dict[str, Array]:
         """Those that there are, by name."""
-        names = (each.name for each in dataclasses.fields(self) if not each.metadata)
+        names = (each.name for each in dataclasses.fields(self))
         return {name: layer for name in names if (layer := getattr(self, name)) is not None}
 
     def map(self, change: Callable[[Array], Array]) -> Frame:
@@ -82,9 +81,7 @@ def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | Non
 
 def frame_of(source: layouts.Source) -> Frame:
     """The frame in a file that `layouts.load` read; raises as `read_frame` does."""
-    told = layouts.samples(source)
-    samples = None if told is None else np.float32(told)
-    return Frame(**layouts.assemble(source), samples=samples)  # type: ignore[arg-type]
+    return Frame(**layouts.assemble(source))  # type: ignore[arg-type]
 
 
 def read_header(path: exr.PathLike) -> dict:

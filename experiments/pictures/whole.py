@@ -18,10 +18,9 @@ SAMPLES = 4
 def draw(folder: Path) -> None:
     """whole.jpg: above noisy and ours, below Open Image Denoise and the reference."""
     source = data.folder().parent / "pictures" / "living"
-    path = source / f"{SAMPLES}spp.exr"
-    frame, layers = jflnr.read_frame(path), whole.read(path)
+    frame = jflnr.read_frame(source / f"{SAMPLES}spp.exr")
     reference = np.mean(whole.references(source / "reference.exr"), axis=0)
-    rows = (frame.beauty, jflnr.denoise(frame)), (whole.best_of_oidn(layers), reference)
+    rows = (frame.beauty, jflnr.denoise(frame)), (whole.best_of_oidn(frame), reference)
     scale = exposure(reference)
     shown = [np.concatenate([display(np.asarray(x), scale) for x in row], axis=1) for row in rows]
     with replacing(folder / "whole.jpg") as beside:

@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from jflnr import __version__
 from jflnr.cli import completion, denoise, devices, fit, info, metrics, report, train
-from jflnr.cli.common import INPUT_ERRORS, INTERRUPTED, sentence, tinted
+from jflnr.cli.common import INPUT_ERRORS, sentence, tinted
 
 EXAMPLES = """\
   jflnr info render.exr                       what is in it, and what would be denoised
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return code
     except KeyboardInterrupt:
         print("jflnr: interrupted; no partial file is left", file=sys.stderr)
-        return INTERRUPTED
+        return 130
     except BrokenPipeError:  # `jflnr info ... | head`
         _drop_output()
         return 0

@@ -12,9 +12,6 @@ from typing import Any, TextIO
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
 INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
 
-# The exit code after Ctrl-C.
-INTERRUPTED = 130
-
 COLOURS = {"red": 31, "yellow": 33}
 
 

@@ -15,7 +15,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jflnr.cli.common import INTERRUPTED
 from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
@@ -92,10 +91,10 @@ def run(arguments: argparse.Namespace) -> int:
     )
     _write(output, result, settings, paths)
     print(f"best: step {result.best.step}{_decibels(result.best)} -> {output}")
-    if not result.stopped:
-        return 0
-    print("stopped; the same command goes on from here")
-    return INTERRUPTED
+    if result.stopped:
+        print("stopped; the same command goes on from here", flush=True)
+        raise KeyboardInterrupt
+    return 0
 
 
 def _shown(paths: Sequence[Path]) -> Iterable[Path]:

@@ -14,12 +14,16 @@ import numpy as np
 from jflnr import exr, layouts
 from jflnr.frame import Frame, frame_of
 from jflnr.large.source import Rows
+from jflnr.layouts.samples import AROUND, Shares, shares_of, told_samples
 from jflnr.layouts.source import recognise
 
 # Rows that are decoded at a time; every compression packs a divisor of it together.
 BATCH = 64
 # What `layouts.assemble` makes a frame's layers of, whichever are asked for.
 NEEDED = ("indirect", "radiance", "beauty", "emission", "albedo", "normal", "depth", "position")
+
+# What `shares_of` reads.
+SHOWING = "normal", "seen_albedo", "alpha"
 
 
 def _openimageio() -> Any:
@@ -59,13 +63,7 @@ class Scanlines:
 
     def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
         """Rows `start` to `stop` of the channels that make up these layers of a frame."""
-        wanted = {*NEEDED, *layers}
-        names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
-        names |= set(self.layout.picture[3:])  # alpha, which goes on to the output
-        channels = self._read(start, stop, sorted(names & set(self.channels)))
-        (x, y), display = self.attributes.window
-        attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
-        return layouts.Source(self.path, channels, attributes, self.layout, True, self.opaque)
+        return self._part(start, stop, layers, self.shares)
 
     @functools.cached_property
     def opaque(self) -> bool:
@@ -76,6 +74,22 @@ class Scanlines:
         parts = (self._read(*rows, names) for rows in zip(starts, stops, strict=True))
         return all(np.all(part[name] == 1) for part in parts for name in names)
 
+    @functools.cached_property
+    def shares(self) -> Shares:
+        """What tells the samples of a picture of Blender, where its header does not."""
+        nothing = np.zeros(0), np.zeros(0)
+        if self.layout.program != "Blender" or told_samples(self.layout, self.attributes):
+            return nothing
+        found = []
+        for start in range(0, self.height, BATCH):
+            stop = min(start + BATCH + AROUND, self.height)
+            images = layouts.assemble(self._part(start, stop, SHOWING, nothing))
+            normal, albedo, alpha = (images[name] for name in SHOWING)
+            assert normal is not None and albedo is not None
+            found.append(shares_of(normal, albedo, alpha, BATCH))
+        turned, others = zip(*found, strict=True)
+        return np.concatenate(turned), np.concatenate(others)
+
     def rows(self, layers: Collection[str]) -> Rows:
         """The rows of these layers on demand."""
 
@@ -85,6 +99,18 @@ class Scanlines:
             return dataclasses.replace(found, **dict.fromkeys(other))  # type: ignore[arg-type]
 
         return Rows(self.height, self.width, read)
+
+    def _part(
+        self, start: int, stop: int, layers: Collection[str], shares: Shares
+    ) -> layouts.Source:
+        wanted = {*NEEDED, *layers}
+        names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
+        names |= set(self.layout.picture[3:])  # alpha, which goes on to the output
+        channels = self._read(start, stop, sorted(names & set(self.channels)))
+        (x, y), display = self.attributes.window
+        attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
+        whole = self.opaque, shares
+        return layouts.Source(self.path, channels, attributes, self.layout, True, *whole)
 
     def _read(self, start: int, stop: int, names: list[str]) -> dict[str, np.ndarray]:
         places = [self.channels.index(name) for name in names]

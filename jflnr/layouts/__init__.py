@@ -8,5 +8,5 @@ from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
 from jflnr.layouts.channels import LAYERS, PICTURE, Layout, layer
 from jflnr.layouts.output import CHOICES, output_channels, pass_names
-from jflnr.layouts.source import Source, is_picture, load, picture, samples
+from jflnr.layouts.source import Source, is_picture, load, picture
 from jflnr.layouts.surface import denoised

@@ -7,6 +7,7 @@ from jflnr.exr import Window
 from jflnr.layouts.camera import camera_of, depth_of, position_of
 from jflnr.layouts.channels import LAYERS, NATIVE, PICTURE, layer
 from jflnr.layouts.light import DARK, demodulate, rest
+from jflnr.layouts.samples import samples_of
 from jflnr.layouts.source import Source
 from jflnr.layouts.surface import SKY
 
@@ -56,7 +57,7 @@ def assemble(source: Source) -> Layers:
         images["motion"] = images["motion"] * np.array([1, -1], np.float32)
     if layout.light != "indirect" or whole:
         separated = _separated(images)
-        images |= (_picture(images | separated, images, source.opaque) if whole else {}) | separated
+        images |= (_picture(images | separated, images, source) if whole else {}) | separated
     if layout.lobes and not source.part:
         images |= _lobes(source)
     return {name: images[name] for name in (*LAYERS, *PICTURE)}
@@ -111,26 +112,29 @@ def _separated(images: Layers) -> Layers:
     }
 
 
-def _picture(images: Layers, given: Layers, opaque: bool | None) -> Layers:
+def _picture(images: Layers, given: Layers, source: Source) -> Layers:
     """The layers of the whole picture.
 
     Where nothing is hit, all of it is environment, unless the program tells or the film is
-    transparent. given: the layers before the picture was separated. opaque: whether alpha is 1 in
-    the whole file, and so none; None to look.
+    transparent. given: the layers before the picture was separated.
     """
     beauty, environment, alpha = (images[name] for name in ("beauty", "environment", "alpha"))
     assert beauty is not None
-    if alpha is not None and (np.all(alpha == 1) if opaque is None else opaque):
+    if alpha is not None and (np.all(alpha == 1) if source.opaque is None else source.opaque):
         alpha = None
     if environment is None and alpha is None:
         environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
-    seen, albedo, depth = images["seen_albedo"], given["albedo"], images["depth"]
-    assert albedo is not None and depth is not None
+    seen, albedo, normal = images["seen_albedo"], given["albedo"], images["normal"]
+    depth, number = images["depth"], images["samples"]
+    assert albedo is not None and normal is not None and depth is not None
     if seen is None:
         # What mirrors and glass reflect, which have no diffuse albedo, is divided by 1.
         bare = (albedo <= DARK).all(axis=-1, keepdims=True) & (depth > 0)
         seen = np.where(bare, np.float32(1), albedo)
+    if number is None and (count := samples_of(source, normal, seen, alpha)) is not None:
+        number = np.broadcast_to(np.float32(count), depth.shape)
     return {
+        "samples": number,
         "emitted": given["emission"],
         "environment": environment,
         "alpha": alpha,

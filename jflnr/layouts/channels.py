@@ -34,6 +34,7 @@ PICTURE = {
     "seen_normal": "XYZ",
     "lobes": "",
     "lobe_colours": "",
+    "samples": "N",
 }
 
 # Every half number as float32, by its bits: numpy converts slower than it looks up.

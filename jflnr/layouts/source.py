@@ -1,7 +1,6 @@
 """A file, and what its channels mean."""
 
 import functools
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ class Source:
     """What `load` found: every channel (H, W) in its own type, the header, and the layout.
 
     part: only some of the file's rows and channels are here. opaque: whether the picture's alpha is
-    1 in all of the file, where that is known.
+    1 in all of the file, where that is known. shares: likewise, what `samples.shares_of` finds.
     """
 
     path: Path
@@ -29,6 +28,7 @@ class Source:
     layout: Layout
     part: bool = False
     opaque: bool | None = None
+    shares: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def header(self) -> dict:
@@ -73,16 +73,6 @@ def recognise(
             if (found := program(own)) is not None:
                 return override(found, mapped, own)
     return override(native.layout(spp or (counts or [1])[0], own), mapped, own)
-
-
-def samples(source: Source) -> int | None:
-    """Samples per pixel of another program's picture, if its header says so."""
-    if source.layout.program == "jflnr" and "beauty" in source.layout.channels:
-        return int(source.layout.channels["beauty"][0].removeprefix("beauty_").removesuffix(".R"))
-    for name, value in source.attributes.others.items():
-        if name == "samplesPerPixel" or re.fullmatch(r"cycles\..*\.samples", name):
-            return int(value) if str(value).isdigit() else None
-    return None
 
 
 def picture(channels: Mapping[str, np.ndarray], source: str) -> np.ndarray:

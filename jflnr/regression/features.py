@@ -38,12 +38,13 @@ def filter_features(
     steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
     following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
     finite in either is left out of the averages, and gets that of its neighbours.
-    samples: per pixel, that either is made of.
+    samples: per pixel, that either is made of, or `(H, W, 1)`.
     Returns the features of `following`.
     """
     steer, follow = jnp.stack(planes(tuple(steering))), jnp.stack(planes(tuple(following)))
     usable = jnp.all(jnp.isfinite(steer), axis=0) & jnp.all(jnp.isfinite(follow), axis=0)
     alike = jnp.sqrt(VARIANCE / jnp.maximum(samples, 1) + LEAST)
+    alike = jnp.reshape(alike, alike.shape[:2])
     _, filtered = average(jnp.where(usable, steer, 0), follow, usable, alike)
     filtered = jnp.moveaxis(filtered, 0, -1)
     ends = [layer.shape[-1] for layer in following]
@@ -56,7 +57,7 @@ def average(
     """Planes averaged along the edges of others.
 
     steer: `(S, H, W)`, what tells the edges. follow: `(K, H, W)`. usable: `(H, W)`, which pixels
-    count. alike: how far `steer` may differ, one standard deviation.
+    count. alike: how far `steer` may differ, one standard deviation, `()` or `(H, W)`.
     Returns how many pixels of equal weight tell as much, `(H, W)`, and the averages, `(K, H, W)`; 0
     where no pixel counts.
     """
@@ -64,13 +65,15 @@ def average(
     # Outside nothing is usable.
     there = jnp.where(usable, jnp.concatenate([jnp.ones_like(follow[:1]), follow]), 0)
     near = blur(steer)
-    padded = [jnp.pad(a, margin) for a in (near / (NEAR * alike), there)]
-    padded, steepness = lax.optimization_barrier((padded, structure(near) / alike**2))
+    padded = [jnp.pad(a, margin) for a in (near, there)]
+    both = structure(near), jnp.full_like(there[:1], NEAR**-2)
+    steepness = jnp.concatenate(both) / alike**2
+    padded, steepness = lax.optimization_barrier((padded, steepness))
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
         around = rows + 2 * REACH
-        likeness, values = (lax.dynamic_slice_in_dim(a, first, around, axis=1) for a in padded)
-        return _windows(likeness, values, lax.dynamic_slice_in_dim(steepness, first, rows, axis=1))
+        others, values = (lax.dynamic_slice_in_dim(a, first, around, axis=1) for a in padded)
+        return _windows(others, values, lax.dynamic_slice_in_dim(steepness, first, rows, axis=1))
 
     sums = jnp.zeros((1 + len(there), *usable.shape), there.dtype)
     sums = fill(sums, 1, usable.shape[0], 1, ROWS, strip)
@@ -82,7 +85,8 @@ def _windows(near: jax.Array, there: jax.Array, steepness: jax.Array) -> jax.Arr
     """Sums of squared weights, of weights and of weighted planes over each window.
 
     near: what must be alike, of some rows with their margins. there: likewise, what is averaged,
-    behind what is usable. steepness: `(3, h, W)`, of the rows. Returns `(2 + K, h, W)`.
+    behind what is usable. steepness: `(4, h, W)`, of the rows, by steps and by what differs.
+    Returns `(2 + K, h, W)`.
     """
     height, width = steepness.shape[1:]
     side = 2 * REACH + 1
@@ -95,7 +99,8 @@ def _windows(near: jax.Array, there: jax.Array, steepness: jax.Array) -> jax.Arr
         )
         y, x = i - REACH, j - REACH
         across = y * y * steepness[0] + 2 * y * x * steepness[1] + x * x * steepness[2]
-        apart = across + (y * y + x * x) / WIDTH**2 + jnp.sum((other - here) ** 2, axis=0)
+        across += steepness[3] * jnp.sum((other - here) ** 2, axis=0)
+        apart = across + (y * y + x * x) / WIDTH**2
         weighted = jnp.exp(-apart / 2) * values
         squared = jnp.exp(-apart) * values[:1]
         return total + jnp.concatenate([squared, weighted])

@@ -8,20 +8,21 @@ filtered as features are.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-from jflnr.frame import Frame
+from jflnr.frame import Array, Frame
 from jflnr.images.guides import FAR, Scene, draw_near, scene_of
 from jflnr.images.inputs import same_size
 from jflnr.images.noisy_guides import antialiased, holds_light
 from jflnr.lazy import jax, jit, jnp, lax, pytree
-from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR, flr_adaptive, light_of
+from jflnr.regression.adaptive import AdaptiveFLR, light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH, find_detail
 from jflnr.regression.features import FARTHEST, SAMPLES, coverage, filter_features
 from jflnr.regression.lobes import split
-from jflnr.stages import Known, Parts, Stage
+from jflnr.stages import Known, Parts, Stage, regress
 
 # Side in pixels of the blocks of the first pass.
 BLOCK = 2
@@ -66,39 +67,18 @@ class Picture(NamedTuple):
     colours: jax.Array | None = None
 
 
-def denoise_picture(
-    picture: Picture,
-    method: AdaptiveFLR = DEFAULT,
-    *,
-    block: int = BLOCK,
-    samples: jax.Array | float | None = None,
-) -> Picture:
-    """The picture without noise: beauty, and filtered every layer that came with it.
-
-    Scales with beauty, emission and environment. No light is negative.
-
-    method: constants of the fit. block: as of `AdaptiveFLR`. samples: per pixel, of all layers; if
-    None it is told by the normals whether layers are antialiased, and so have noise.
-    """
-    unit = jnp.nanmean(picture.beauty)
-    clean = cleaned(picture, unit, samples, antialiased(picture.normal))
-    lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
-    images = images_of(picture, clean, unit, lit)
-    layers = images["target"], images["guides"]
-    fitted = flr_adaptive(*layers, method, block=block, weight=images["weight"])
-    return clean._replace(beauty=composed(images | {"image": fitted}))
-
-
 def cleaned(
-    picture: Picture, unit: jax.Array, samples: jax.Array | float | None, averaged: jax.Array
+    picture: Picture, unit: jax.Array, samples: Array | float | None, averaged: jax.Array
 ) -> Picture:
     """The picture with layers that are free of noise.
 
-    unit: brightness of the picture, `()`. samples: per pixel; if None, averaged says whether the
-    layers are means of several, and so have noise.
+    unit: brightness of the picture, `()`. samples: per pixel, or `(H, W, 1)`; 0 if nobody says how
+    many, None if there may be none but of the pixels' centres. averaged: whether the layers show
+    that they are means of several, `()`.
     """
     if samples is not None:
-        return filter_picture(picture, unit, samples)
+        guess = jnp.where(averaged, SAMPLES, 1)
+        return filter_picture(picture, unit, jnp.where(samples > 0, samples, guess))
     clean = filter_picture(picture, unit, SAMPLES)
     return jax.tree.map(lambda new, old: jnp.where(averaged, new, old), clean, picture)
 
@@ -161,7 +141,7 @@ class WholePicture(AdaptiveFLR):
     def features(self) -> tuple[str, ...]:
         """The layers that it reads."""
         lobes = ("lobes", "lobe_colours") if self.lobes else ()
-        return ("beauty", "alpha", "emitted", "environment", *self.guides, *lobes)
+        return ("beauty", "alpha", "emitted", "environment", "samples", *self.guides, *lobes)
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> WholePicture:
         if frame.beauty is None or frame.seen_albedo is None:
@@ -185,6 +165,31 @@ class WholePicture(AdaptiveFLR):
         reach = EVERYTHING if self.lobes else REACH
         last = Stage(compose, gives, given, True, reach, align=DETAIL_BLOCK, composes=True)
         return *fit, last
+
+
+DEFAULT = WholePicture()
+
+
+def denoise_picture(
+    picture: Picture,
+    method: WholePicture = DEFAULT,
+    *,
+    samples: jax.Array | float | None = None,
+    **options: Any,
+) -> Picture:
+    """The picture without noise: beauty, and filtered every layer that came with it.
+
+    Scales with beauty, emission and environment. No light is negative.
+
+    method: constants and options, without `lobes`; options: fields of it to replace. samples: as of
+    `cleaned`.
+    """
+    unit, averaged = jnp.nanmean(picture.beauty), antialiased(picture.normal)
+    clean = cleaned(picture, unit, samples, averaged)
+    lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
+    images = images_of(picture, clean, unit, lit)
+    given = regress(dataclasses.replace(method, **options), images)
+    return clean._replace(beauty=given["image"][..., :3])
 
 
 def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:

@@ -6,10 +6,9 @@ import pytest
 
 import jflnr
 from jflnr.images.noisy_guides import holds_light
-from jflnr.regression.adaptive import AdaptiveFLR
-from jflnr.regression.picture import Picture, denoise_picture, reflecting
+from jflnr.regression.picture import Picture, WholePicture, denoise_picture, reflecting
 
-FEW = AdaptiveFLR(levels=2)
+FEW = WholePicture(levels=2)
 
 
 @jax.jit

@@ -161,7 +161,7 @@ def test_a_picture_is_read_as_other_programs_pictures_are(
     frame.write(path, layers, facts)
     for spp in (1, 4):
         read = read_frame(path, spp)
-        assert read.samples == spp and default_of(read) == "picture"
+        assert np.all(read.samples == spp) and default_of(read) == "picture"
         assert read.beauty is not None and read.seen_albedo is not None
         np.testing.assert_allclose(read.beauty, layers[f"beauty_{spp}"], rtol=2e-3, atol=1e-6)
         np.testing.assert_allclose(
