@@ -165,10 +165,10 @@ class Denoiser:
             return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":
             return _given(on_frame(method, inputs, names), frame, out)
-        from jflnr.opencl import smooth_guide
+        from jflnr.opencl.twins import filters_on
 
-        smooth = functools.partial(smooth_guide, context=self.context)
-        light = self._on_device(method)(method.images(inputs, names, smooth=smooth), out)
+        images = method.images(inputs, names, filters=filters_on(self.context))
+        light = self._on_device(method)(images, out)
         return light if out is not None else _given({"image": light}, frame, None)
 
     @_own_settings

@@ -4,7 +4,7 @@ A method is a frozen dataclass, a pytree: its numbers are leaves, its options ar
 - `name`, and `backends`, those that it runs on, if not on all;
 - `for_frame(inputs, names)`: the method with what it takes from the frame's size filled in, or
   `ValueError` for a frame that it cannot denoise (another set of guides, light of another size);
-- `images(frame, names, scene, smooth)`: what it reads of the pixels, and `margin`, how many pixels
+- `images(frame, names, scene, filters)`: what it reads of the pixels, and `margin`, how many pixels
   those depend on beyond their own;
 - `known(images)`: what is known of the whole frame from a sparse grid of its pixels;
 - `stages()`: what it does (`jflnr.stages`).

@@ -72,10 +72,10 @@ def on_frame(method: Any, frame: Any, names: tuple[str, ...]) -> Parts:
     return regress(method, method.images(frame, names))
 
 
-def compose(method: Any, parts: Parts) -> Any | None:
+def compose(method: Any, parts: Parts, known: Known | None = None) -> Any | None:
     """The picture with `image`, denoised light, in it; None for a method of light alone.
 
-    parts: what the method's `images` made, and the light.
+    parts: what the method's `images` made, and the light. known: what the method takes besides.
     """
     stages = [stage for stage in method.stages() if stage.composes]
-    return run(stages, method, parts, {})[0]["image"] if stages else None
+    return run(stages, method, parts, known or {})[0]["image"] if stages else None

@@ -21,7 +21,7 @@ from jflnr.checks import one_sentence
 from jflnr.frame import Array, Frame
 from jflnr.images import guides as guide_layers
 from jflnr.images.inputs import plain_images, prepare, robust_images, same_size
-from jflnr.images.noisy_guides import smooth_guide
+from jflnr.images.noisy_guides import Filters
 from jflnr.methods import method_of
 from jflnr.network.flnr import GUIDES, NEEDED
 from jflnr.regression.adaptive import light_of
@@ -178,7 +178,7 @@ def _collect(
     """
     scene = guide_layers.scene_of(frame)
     prepared = robust_images if _is_fine(block) else plain_images
-    images = prepared(frame, names, scene, smooth_guide)
+    images = prepared(frame, names, scene)
     collected = collect_frame(images["target"], images["guides"], block, images["weight"])
     smoothed = "ao" in names and _is_fine(block)
     return scene, images["guides"][names.index("ao")] if smoothed else None, collected
@@ -197,7 +197,7 @@ def _image(
     """Evaluate the models at every pixel, reading the guides `used` only."""
     block, collected = fitted.block, fitted.collected
     prepared = robust_images if _is_fine(block) else plain_images
-    images = prepared(fitted.frame, fitted.names, fitted.scene, lambda ao, *_: ao)
+    images = prepared(fitted.frame, fitted.names, fitted.scene, Filters(lambda ao, *_: ao))
     target, layers = images["target"], images["guides"]
     ends = np.cumsum([layer.shape[-1] for layer in layers])
     kept = [int(q) for n in used for q in range(ends[n] - layers[n].shape[-1], ends[n])]

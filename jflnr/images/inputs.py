@@ -2,15 +2,15 @@
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from jflnr import checks
-from jflnr.frame import Array, Frame
+from jflnr.frame import Frame
 from jflnr.images import guides as guide_layers
-from jflnr.images.noisy_guides import smooth_guide
+from jflnr.images.noisy_guides import FILTERS, Filters
 from jflnr.layouts import LAYERS, PICTURE
 
 
@@ -91,13 +91,13 @@ def plain_images(
     frame: Frame,
     names: tuple[str, ...],
     scene: guide_layers.Scene | None = None,
-    smooth: Callable[..., Array] | None = None,
+    filters: Filters = FILTERS,
 ) -> dict[str, Any]:
     """The layers as they are; numpy's stay where they are.
 
     target: the light. guides: averaged over its pixels, if these are larger. guides_map: the guides
     that the models are evaluated on, if those are others. weight: which pixels count, or None.
-    scene: of the frame that this one is a part of; the frame's own if None. smooth: not used.
+    scene: of the frame that this one is a part of; the frame's own if None. filters: not used.
     """
     target, mask = frame.indirect, frame.mask
     layers = guide_layers.layers(frame, names, scene)
@@ -117,18 +117,15 @@ def robust_images(
     frame: Frame,
     names: tuple[str, ...],
     scene: guide_layers.Scene | None = None,
-    smooth: Callable[..., Array] = smooth_guide,
+    filters: Filters = FILTERS,
 ) -> dict[str, Any]:
-    """`plain_images` with far depths drawn near and ambient occlusion without noise.
-
-    smooth: what takes the noise from a guide, given the normal and the depth.
-    """
+    """`plain_images` with far depths drawn near and ambient occlusion without noise."""
     images = plain_images(frame, names, scene)
     layers = dict(zip(names, images["guides"], strict=False))
     if "depth" in layers:
         layers["depth"] = guide_layers.draw_near(layers["depth"])
     if "ao" in layers:
-        layers["ao"] = smooth(layers["ao"], frame.normal, frame.depth)
+        layers["ao"] = filters.smooth(layers["ao"], frame.normal, frame.depth)
     # Without names there is one layer of no channels.
     images["guides"] = tuple(layers.values()) or images["guides"]
     return images

@@ -10,14 +10,14 @@ fireflies. It ends in zeros before training: FLNR then is adaptive FLR.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from jflnr.frame import Array, Frame
+from jflnr.frame import Frame
 from jflnr.images.guides import Scene
 from jflnr.images.inputs import robust_images, same_size
-from jflnr.images.noisy_guides import smooth_guide
+from jflnr.images.noisy_guides import FILTERS, Filters
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
 from jflnr.regression import adaptive
@@ -61,11 +61,11 @@ class FLNR(AdaptiveFLR):
         frame: Frame,
         names: Sequence[str],
         scene: Scene | None = None,
-        smooth: Callable[..., Array] = smooth_guide,
+        filters: Filters = FILTERS,
     ) -> Parts:
         """The guides in the order in which the network takes them."""
         ordered = tuple(name for name in GUIDES if name in names)
-        return robust_images(frame, ordered, scene, smooth)
+        return robust_images(frame, ordered, scene, filters)
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> FLNR:
         same_size(frame, self.name)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jflnr.opencl import devices
+from jflnr.opencl import devices, kept
 
 
 class Launch(NamedTuple):
@@ -47,6 +47,7 @@ class Context:
         self.work_group = work_group or (32 if self.on_cpu else 64)
         self._programs: dict[tuple[Any, ...], Any] = {}
         self._kernels: dict[tuple[Any, ...], Any] = {}
+        self._to_keep: dict[Path, Any] = {}  # programs that are not on disk yet
         self._lock = threading.Lock()  # from setting a kernel's arguments until it is enqueued
         # What a thread has given to kernels that may not be through, and what it has launched.
         self._in_use: dict[int, list[np.ndarray]] = {}
@@ -136,6 +137,7 @@ class Context:
         if self.on_cpu:
             self.queue.finish()
             self._in_use.pop(threading.get_ident(), None)
+            self._keep_programs()
         if output is not result and not self.on_cpu:
             output.get(ary=result)
         elif output is not result:
@@ -153,14 +155,36 @@ class Context:
         program = (file, *sorted(defines.items()))
         key = (name, *program)
         if program not in self._programs:
-            options = [f"-D{define}={value}" for define, value in defines.items()]
-            self._programs[program] = self.cl.Program(self.context, source(file)).build(options)
+            self._programs[program] = self._program(file, defines)
         if key not in self._kernels:
             self._kernels[key] = kernel = self.cl.Kernel(self._programs[program], name)
             # Told the types of numbers, pyopencl raises no C++ exception to find each of them out:
             # one takes milliseconds in a process in which JAX has compiled many programs.
             kernel.set_scalar_arg_dtypes([_type(value) for value in arguments])
         return self._kernels[key]
+
+    def _program(self, file: str, defines: dict[str, int]) -> Any:
+        text = source(file)
+        options = [f"-D{define}={value}" for define, value in sorted(defines.items())]
+        place = kept.place_of(self.device, text, options) if self.on_cpu else None
+        if place is None:
+            return self._build(text, options)
+        if (binary := kept.read(place)) is not None:
+            # A damaged one, or one that another driver left, is as good as none.
+            with contextlib.suppress(self.cl.Error):
+                return self.cl.Program(self.context, [self.device], [binary]).build()
+        self._to_keep[place] = program = self._build(text, options)
+        return program
+
+    def _build(self, text: str, options: list[str]) -> Any:
+        return self.cl.Program(self.context, text).build(options)
+
+    def _keep_programs(self) -> None:
+        """Write new programs to disk: once their kernels have run, they hold their code."""
+        with self._lock:
+            new, self._to_keep = self._to_keep, {}
+        for place, program in new.items():
+            kept.write(place, program.get_info(self.cl.program_info.BINARIES)[0])
 
 
 def is_device_array(values: Any) -> bool:

@@ -1,6 +1,5 @@
 """Denoising with a history on an OpenCL device: the steps of jflnr/temporal/sequence.py."""
 
-import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +14,6 @@ from jflnr.opencl.bmfr import to_device
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
 from jflnr.opencl.moments import guide_defines, run_on_rows
-from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
@@ -55,8 +53,8 @@ def step(
     """
     context = default_context() if context is None else context
     method, names, inputs = prepared(state, frame, method, guides, options)
-    smooth = functools.partial(smooth_guide, context=context)
-    given = method.images(inputs, names, smooth=smooth)
+    filters = twins.filters_on(context)
+    given = method.images(inputs, names, filters=filters)
     layers = to_layers(context, given["guides"])
     sample, motion = (to_device(context, layer) for layer in (given["target"], frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
@@ -78,7 +76,7 @@ def step(
     context.finish(result, result)
     state = State(surface, light, image, evidence)
     averages = {"target": averaged.get(), "image": result.get()}
-    if (picture := compose(method, given | averages)) is not None:
+    if (picture := compose(method, given | averages, {"average": filters.average})) is not None:
         return state, context.array(np.asarray(picture)) if on_device else np.asarray(picture)
     return state, result if on_device else result.get()
 

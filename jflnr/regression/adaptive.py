@@ -28,7 +28,6 @@ from jflnr.regression.moments import (
     collect,
     collect_weighted,
     index_xy,
-    planes,
     unit_of,
 )
 from jflnr.regression.multiscale import fit_levels, merged_models
@@ -287,10 +286,7 @@ def keep_energy(method: Any, parts: Parts, known: Known) -> Parts:
 def light_of(target: jax.Array, unit: jax.Array | float = 1) -> jax.Array:
     """Brightness of the pixels over `unit`, `(H, W, C)` to `(H, W)`."""
     weights = brightness(target.shape[-1], target.dtype)
-    return sum(
-        (w * (plane / unit) for w, plane in zip(weights, planes(target), strict=True)),
-        jnp.zeros(target.shape[:2], target.dtype),
-    )
+    return sum((w * (target[..., c] / unit) for c, w in enumerate(weights)))
 
 
 def _weights(

@@ -7,12 +7,14 @@ the blocks nearby, is signal (the Wiener filter), and so much of the average is 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from jflnr.frame import Array
 from jflnr.images.guides import shrink
-from jflnr.lazy import jax, jnp
-from jflnr.regression.apply import apply
-from jflnr.regression.division import divide
 from jflnr.regression.features import FARTHEST, average
-from jflnr.regression.moments import planes
 
 # Side in pixels of the blocks on which signal is told from noise.
 BLOCK = 16
@@ -27,26 +29,43 @@ REACH = FARTHEST + 2 * BLOCK
 
 
 def find_detail(
-    noisy: jax.Array, fitted: jax.Array, weight: jax.Array, unit: jax.Array
-) -> jax.Array:
+    noisy: Array,
+    fitted: Array,
+    weight: Array,
+    unit: Array,
+    average: Callable[..., Any] = average,
+) -> Array:
     """What the fitted picture lacks of the noisy one's detail, `(H, W, 3)`.
 
     noisy, fitted: `(H, W, 3)`. weight: `(H, W)`, how much each pixel counts, 0 to 1; one that is
-    not finite does not. unit: mean brightness of the picture, `(1, 1, 1)` or of its size.
+    not finite does not. unit: mean brightness of the picture, `(1, 1, 1)` or of its size. average:
+    `features.average`, or that of a device.
     """
-    unit = jnp.maximum(unit, 1e-12)
-    scale = jnp.mean(fitted, axis=-1, keepdims=True) + DARK * unit
-    left = jnp.stack(planes((noisy - fitted) / scale))
-    usable = jnp.all(jnp.isfinite(left), axis=0)
-    left = jnp.where(usable, left * weight, 0)
-    follow = jnp.concatenate([left, jnp.mean(left**2, axis=0, keepdims=True)])
-    steer = jnp.where(usable, jnp.stack(planes(jnp.log1p(fitted / unit))), 0)
+    xp: Any = fitted.__array_namespace__()
+    unit = xp.maximum(unit, 1e-12)
+    scale = xp.mean(fitted, axis=-1, keepdims=True) + DARK * unit
+    left = xp.moveaxis((noisy - fitted) / scale, -1, 0)
+    usable = xp.all(xp.isfinite(left), axis=0)
+    left = xp.where(usable, left * weight, 0)
+    follow = xp.concatenate([left, xp.mean(left**2, axis=0, keepdims=True)])
+    steer = xp.where(usable, xp.moveaxis(xp.log1p(fitted / unit), -1, 0), 0)
     number, (*mean, square) = average(steer, follow, usable, ALIKE)
-    detail = jnp.stack(mean, axis=-1)
-    signal = jnp.mean(detail**2, axis=-1)
-    noise = jnp.maximum(square - signal, 0) / jnp.maximum(number - 1, FEWEST)
-    found = shrink(jnp.stack([signal, signal - noise], axis=-1), BLOCK)
-    share = divide(jnp.maximum(found[..., 1], 0), found[..., 0])[None, None]
-    none = jnp.zeros((*usable.shape, 0), share.dtype)
-    share = apply(share, none, jnp.zeros(0, share.dtype), BLOCK)
-    return share * detail * scale
+    detail = xp.stack(mean, axis=-1)
+    signal = xp.mean(detail**2, axis=-1)
+    noise = xp.maximum(square - signal, 0) / xp.maximum(number - 1, FEWEST)
+    found = shrink(xp.stack([signal, signal - noise], axis=-1), BLOCK)
+    share = xp.maximum(found[..., 1], 0) / xp.maximum(found[..., 0], 1e-30)
+    return enlarge(share, BLOCK, usable.shape)[..., None] * detail * scale
+
+
+def enlarge(blocks: Array, block: int, size: tuple[int, int]) -> Array:
+    """Blocks `(h, w)` interpolated bilinearly between their centres, to `size` pixels."""
+    xp: Any = blocks.__array_namespace__()
+    for axis, (count, last) in enumerate(zip(size, blocks.shape, strict=True)):
+        place = np.clip((np.arange(count) + 0.5) / block - 0.5, 0, last - 1)
+        before = np.minimum(place.astype(int), max(last - 2, 0))
+        t = (place - before).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
+        first = xp.take(blocks, before, axis=axis)
+        second = xp.take(blocks, np.minimum(before + 1, last - 1), axis=axis)
+        blocks = first + t * (second - first)
+    return blocks

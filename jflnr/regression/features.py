@@ -9,10 +9,14 @@ Regression for Image Processing and Reconstruction", 2007).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
 
+import numpy as np
+
+from jflnr.frame import Array
 from jflnr.lazy import jax, jnp, lax
-from jflnr.regression.moments import planes
 from jflnr.regression.strips import ROWS, fill
 
 # Pixels on each side of a window of 7 x 7, and the standard deviation of its weights.
@@ -26,29 +30,6 @@ SAMPLES = 4
 # How many pixels away a filtered one looks: over its window and that of `coverage`, and seven
 # times at the next pixel, for blurs and gradients.
 FARTHEST = 2 * REACH + 7
-
-
-def filter_features(
-    steering: Sequence[jax.Array],
-    following: Sequence[jax.Array],
-    samples: jax.Array | float = SAMPLES,
-) -> tuple[jax.Array, ...]:
-    """Features averaged along the edges that they share.
-
-    steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
-    following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
-    finite in either is left out of the averages, and gets that of its neighbours.
-    samples: per pixel, that either is made of, or `(H, W, 1)`.
-    Returns the features of `following`.
-    """
-    steer, follow = jnp.stack(planes(tuple(steering))), jnp.stack(planes(tuple(following)))
-    usable = jnp.all(jnp.isfinite(steer), axis=0) & jnp.all(jnp.isfinite(follow), axis=0)
-    alike = jnp.sqrt(VARIANCE / jnp.maximum(samples, 1) + LEAST)
-    alike = jnp.reshape(alike, alike.shape[:2])
-    _, filtered = average(jnp.where(usable, steer, 0), follow, usable, alike)
-    filtered = jnp.moveaxis(filtered, 0, -1)
-    ends = [layer.shape[-1] for layer in following]
-    return tuple(filtered[..., sum(ends[:i]) : sum(ends[: i + 1])] for i in range(len(ends)))
 
 
 def average(
@@ -109,7 +90,7 @@ def _windows(near: jax.Array, there: jax.Array, steepness: jax.Array) -> jax.Arr
     return lax.fori_loop(0, side**2, add, empty)
 
 
-def structure(image: jax.Array) -> jax.Array:
+def structure(image: Any) -> Any:
     """Mean products of the gradients, down by down, down by right and right by right, `(3, H, W)`.
 
     The form of a step is the square of what all planes of `image`, `(K, H, W)`, change over it.
@@ -122,34 +103,86 @@ def structure(image: jax.Array) -> jax.Array:
     return tensor
 
 
-def _slope(image: jax.Array, axis: int) -> jax.Array:
+def _slope(image: Array, axis: int) -> Array:
     before, _, after = _three(image, axis)
-    return lax.optimization_barrier((after - before) / 2)
+    return _as_it_is((after - before) / 2)
 
 
-def coverage(image: jax.Array, least: jax.Array | float) -> jax.Array:
+def filter_features(
+    steering: Sequence[Array],
+    following: Sequence[Array],
+    samples: Array | float = SAMPLES,
+    average: Callable[..., Any] = average,
+) -> tuple[Array, ...]:
+    """Features averaged along the edges that they share.
+
+    steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
+    following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
+    finite in either is left out of the averages, and gets that of its neighbours.
+    samples: per pixel, that either is made of, or `(H, W, 1)`. average: that of a
+    device.
+    Returns the features of `following`.
+    """
+    xp: Any = steering[0].__array_namespace__()
+    steer, follow = (
+        xp.stack([layer[..., q] for layer in layers for q in range(layer.shape[-1])])
+        for layers in (steering, following)
+    )
+    usable = xp.all(xp.isfinite(steer), axis=0) & xp.all(xp.isfinite(follow), axis=0)
+    alike = xp.sqrt(VARIANCE / xp.maximum(xp.asarray(samples), 1) + LEAST)
+    alike = xp.reshape(alike, alike.shape[:2])
+    _, filtered = average(xp.where(usable, steer, 0), follow, usable, alike)
+    filtered = xp.moveaxis(filtered, 0, -1)
+    ends = [layer.shape[-1] for layer in following]
+    return tuple(filtered[..., sum(ends[:i]) : sum(ends[: i + 1])] for i in range(len(ends)))
+
+
+def coverage(image: Array, least: Array | float) -> Array:
     """Light, or albedo that shows lamps, as the share of what is brightest nearby.
 
     At the edge of something far brighter than white, the share of the pixel that it covers is
     what is alike along the edge. image: `(H, W, C)`. least: brightness below which nothing counts
     as bright, `()`. Returns `(H, W, C)`, about 0 to 1.
     """
-    side = 2 * REACH + 1
-    peak = jnp.max(jnp.where(jnp.isfinite(image), image, 0), axis=-1)
-    peak = lax.reduce_window(peak, 0.0, lax.max, (side, side), (1, 1), "SAME")
-    return image / jnp.maximum(blur(blur(peak[None]))[0], least)[..., None]
+    xp: Any = image.__array_namespace__()
+    peak = xp.max(xp.where(xp.isfinite(image), image, 0), axis=-1)
+    peak = combine(peak, REACH, xp.maximum)
+    return image / xp.maximum(blur(blur(peak[None]))[0], least)[..., None]
 
 
-def blur(image: jax.Array) -> jax.Array:
-    """The mean over 3 x 3 pixels with the weights 1, 2, 1, `(K, H, W)`; borders are repeated."""
-    for axis in (1, 2):
-        before, here, after = _three(image, axis)
-        image = lax.optimization_barrier((before + 2 * here + after) / 4)
+def combine(image: Array, reach: int, two: Callable[[Array, Array], Array]) -> Array:
+    """The sum or the greatest of `2 reach + 1` pixels down and across, with zeros outside.
+
+    image: `(H, W)`. two: that of two images.
+    """
+    xp: Any = image.__array_namespace__()
+    for axis in (0, 1):
+        padded = xp.pad(image, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)])
+        moved = [_rows(padded, axis, k, image.shape[axis]) for k in range(2 * reach + 1)]
+        image = functools.reduce(two, moved)
     return image
 
 
-def _three(image: jax.Array, axis: int) -> list[jax.Array]:
+def blur(image: Any) -> Any:
+    """The mean over 3 x 3 pixels with the weights 1, 2, 1, `(K, H, W)`; borders are repeated."""
+    for axis in (1, 2):
+        before, here, after = _three(image, axis)
+        image = _as_it_is((before + 2 * here + after) / 4)
+    return image
+
+
+def _three(image: Array, axis: int) -> list[Array]:
     """The pixels before, those here and those after, along an axis; borders are repeated."""
+    xp: Any = image.__array_namespace__()
     margin = [(1, 1) if a == axis else (0, 0) for a in range(3)]
-    padded, size = jnp.pad(image, margin, mode="edge"), image.shape[axis]
-    return [lax.slice_in_dim(padded, k, k + size, axis=axis) for k in range(3)]
+    padded = xp.pad(image, margin, mode="edge")
+    return [_rows(padded, axis, k, image.shape[axis]) for k in range(3)]
+
+
+def _rows(image: Array, axis: int, first: int, count: int) -> Array:
+    return image[(slice(None),) * axis + (slice(first, first + count),)]
+
+
+def _as_it_is(image: Array) -> Array:
+    """What XLA is not to compute anew for every pixel that reads it."""
+    return image if isinstance(image, np.ndarray) else lax.optimization_barrier(image)

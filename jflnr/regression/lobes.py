@@ -6,10 +6,7 @@ coarsely by itself; the fits tell what share of the denoised light is the pass's
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
-from jax import lax
-
+from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.moments import Guides
 

@@ -9,18 +9,26 @@ filtered as features are.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
 from jflnr.frame import Array, Frame
 from jflnr.images.guides import FAR, Scene, draw_near, scene_of
 from jflnr.images.inputs import same_size
-from jflnr.images.noisy_guides import antialiased, holds_light
-from jflnr.lazy import jax, jit, jnp, lax, pytree
+from jflnr.images.noisy_guides import FILTERS, Filters, antialiased, holds_light
+from jflnr.lazy import jax, jit, jnp, pytree
 from jflnr.regression.adaptive import AdaptiveFLR, light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH, find_detail
-from jflnr.regression.features import FARTHEST, SAMPLES, coverage, filter_features
+from jflnr.regression.features import (
+    FARTHEST,
+    SAMPLES,
+    average,
+    combine,
+    coverage,
+    filter_features,
+)
 from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage, regress
 
@@ -55,66 +63,76 @@ class Picture(NamedTuple):
     (`lobes.split`).
     """
 
-    beauty: jax.Array
-    albedo: jax.Array
-    normal: jax.Array
-    seen_normal: jax.Array | None = None
-    depth: jax.Array | None = None
-    position: jax.Array | None = None
-    emission: jax.Array | None = None
-    environment: jax.Array | None = None
-    alpha: jax.Array | None = None
-    colours: jax.Array | None = None
+    beauty: Array
+    albedo: Array
+    normal: Array
+    seen_normal: Array | None = None
+    depth: Array | None = None
+    position: Array | None = None
+    emission: Array | None = None
+    environment: Array | None = None
+    alpha: Array | None = None
+    colours: Array | None = None
 
 
 def cleaned(
-    picture: Picture, unit: jax.Array, samples: Array | float | None, averaged: jax.Array
+    picture: Picture,
+    unit: Array,
+    samples: Array | float | None,
+    averaged: Array,
+    average: Callable[..., Any] = average,
 ) -> Picture:
     """The picture with layers that are free of noise.
 
     unit: brightness of the picture, `()`. samples: per pixel, or `(H, W, 1)`; 0 if nobody says how
     many, None if there may be none but of the pixels' centres. averaged: whether the layers show
-    that they are means of several, `()`.
+    that they are means of several, `()`. average: `features.average`, or that of a device.
     """
+    xp: Any = picture.beauty.__array_namespace__()
     if samples is not None:
-        guess = jnp.where(averaged, SAMPLES, 1)
-        return filter_picture(picture, unit, jnp.where(samples > 0, samples, guess))
-    clean = filter_picture(picture, unit, SAMPLES)
-    return jax.tree.map(lambda new, old: jnp.where(averaged, new, old), clean, picture)
+        guess = xp.where(averaged, SAMPLES, 1)
+        return filter_picture(picture, unit, xp.where(samples > 0, samples, guess), average)
+    clean = filter_picture(picture, unit, SAMPLES, average)
+    layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
+    chosen = {name: xp.where(averaged, getattr(clean, name), layers[name]) for name in layers}
+    return picture._replace(**chosen)
 
 
-def images_of(picture: Picture, clean: Picture, unit: jax.Array, lit: jax.Array) -> Parts:
+def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Parts:
     """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again.
 
     unit: brightness of the picture, `()`. lit: as of `holds_light`.
     """
-    covered = jnp.ones((1,) * 3) if clean.alpha is None else jnp.clip(clean.alpha, 0, 1)
-    surface = jnp.maximum(reflecting(clean, lit), LEAST_ALBEDO * covered)
-    light = jnp.maximum(picture.beauty - own_light(picture), 0) / jnp.maximum(surface, 1e-6)
+    xp: Any = picture.beauty.__array_namespace__()
+    covered = xp.ones((1,) * 3, xp.float32) if clean.alpha is None else xp.clip(clean.alpha, 0, 1)
+    surface = xp.maximum(reflecting(clean, lit), LEAST_ALBEDO * covered)
+    light = xp.maximum(picture.beauty - own_light(picture), 0) / xp.maximum(surface, 1e-6)
     weight = firefly_weight(light_of(light)) * (covered > LEAST_ALPHA)[..., 0]
-    guiding = clean._replace(albedo=jnp.clip(clean.albedo, 0, 1))
+    guiding = clean._replace(albedo=xp.clip(clean.albedo, 0, 1))
     layers = [getattr(guiding, name) for name in GUIDES]
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
     own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
     images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
     # By rows, as parts of a frame are.
-    images |= {"brightness": jnp.broadcast_to(unit, (len(light), 1, 1))}
+    images |= {"brightness": xp.broadcast_to(unit, (len(light), 1, 1))}
     images |= {"emitted": own[0], "environment": own[1]}
     return images | {"colours": (picture.colours, clean.colours)}
 
 
-def composed(images: Parts) -> jax.Array:
+def composed(images: Parts, average: Callable[..., Any] = average) -> Array:
     """The picture `(H, W, 3)` from `image`, its light without noise, with its detail.
 
-    It is nowhere darker than what is emitted and seen of the environment.
+    It is nowhere darker than what is emitted and seen of the environment. average:
+    `features.average`, or that of a device.
     """
+    xp: Any = images["surface"].__array_namespace__()
     noisy, fitted = (
-        jnp.maximum(images[light], 0) * images["surface"] + images["own"]
+        xp.maximum(images[light], 0) * images["surface"] + images["own"]
         for light in ("target", "image")
     )
-    detail = find_detail(noisy, fitted, images["weight"], images["brightness"])
-    return jnp.maximum(fitted + detail, images["own"])
+    detail = find_detail(noisy, fitted, images["weight"], images["brightness"], average)
+    return xp.maximum(fitted + detail, images["own"])
 
 
 @pytree
@@ -152,10 +170,17 @@ class WholePicture(AdaptiveFLR):
         return self
 
     def images(
-        self, frame: Frame, names: tuple[str, ...], scene: Scene | None = None, smooth: Any = None
+        self,
+        frame: Frame,
+        names: tuple[str, ...],
+        scene: Scene | None = None,
+        filters: Filters = FILTERS,
     ) -> Parts:
         """The light of the surfaces, the guides, and what makes it a picture again."""
-        return _images(frame, scene_of(frame) if scene is None else scene)
+        scene = scene_of(frame) if scene is None else scene
+        if filters.average is None:
+            return _images(frame, scene)
+        return _images.__wrapped__(frame, scene, filters.average)
 
     def stages(self) -> tuple[Stage, ...]:
         fit = super().stages()
@@ -196,36 +221,38 @@ def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
     """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`; its error; and its light passes, as
     in `Frame.lobes`, their colours, and what is emitted and seen of the environment, as planes of
     `(H, W, C)`."""
-    image, alpha = composed(parts), parts["alpha"]
-    given = {"image": image if alpha is None else jnp.concatenate([image, alpha], axis=-1)}
+    image, alpha = composed(parts, known.get("average", average)), parts["alpha"]
+    xp: Any = image.__array_namespace__()
+    given = {"image": image if alpha is None else xp.concatenate([image, alpha], axis=-1)}
     if method.lobes:
         emitted, environment = parts["emitted"], parts["environment"]
         images = parts["lobes"], parts["colours"], parts["guides"][:LOBE_GUIDES], parts["weight"]
         noisy = parts["target"] * parts["surface"]
         passes, left = split(image - parts["own"], noisy, *images)
         planes = [passes, parts["colours"][1], emitted + left, environment]
-        given["passes"] = jnp.concatenate(planes, axis=-1)
+        given["passes"] = xp.concatenate(planes, axis=-1)
     if method.with_error:
         given["error"] = parts["error"] * light_of(parts["surface"])[..., None]
     return given
 
 
 @jit
-def _images(frame: Frame, scene: Scene) -> Parts:
+def _images(frame: Frame, scene: Scene, average: Callable[..., Any] = average) -> Parts:
     picture = picture_in(frame, scene)
     assert scene.averaged is not None and scene.light is not None and scene.lit is not None
-    clean = cleaned(picture, scene.light, frame.samples, scene.averaged)
+    clean = cleaned(picture, scene.light, frame.samples, scene.averaged, average)
     images = images_of(picture, clean, scene.light, scene.lit)
     return images | {"lobes": frame.lobes}
 
 
 def picture_in(frame: Frame, scene: Scene) -> Picture:
     """The picture in a frame, its lengths over the median depth; what is nowhere is far."""
+    xp: Any = frame.depth.__array_namespace__()
     there, scale = frame.depth > 0, 1 / scene.depth
-    depth = jnp.where(frame.depth == 0, FAR + 1, draw_near(frame.depth * scale))
+    depth = xp.where(frame.depth == 0, FAR + 1, draw_near(frame.depth * scale))
     position = frame.position
     if position is not None:
-        position = jnp.where(there, (position - scene.middle) * scale, 0)
+        position = xp.where(there, (position - scene.middle) * scale, 0)
     layers = {
         "beauty": frame.beauty,
         "albedo": frame.seen_albedo,
@@ -238,49 +265,55 @@ def picture_in(frame: Frame, scene: Scene) -> Picture:
         "alpha": frame.alpha,
         "colours": frame.lobe_colours,
     }
-    return Picture(**layers)  # type: ignore[arg-type]
+    return Picture(**layers)
 
 
-def own_light(picture: Picture) -> jax.Array:
+def own_light(picture: Picture) -> Array:
     """What no surface reflects and beauty holds, `(H, W, 3)`: emission, and what is behind all."""
     behind = None if picture.alpha is not None else picture.environment
     return light_in(picture, picture.emission, behind)
 
 
-def reflecting(picture: Picture, lit: jax.Array) -> jax.Array:
+def reflecting(picture: Picture, lit: Array) -> Array:
     """The albedo of what reflects alone, `(H, W, 3)`. lit: as of `holds_light`."""
+    xp: Any = picture.albedo.__array_namespace__()
     own = light_in(picture, picture.emission, picture.environment)
-    return jnp.maximum(picture.albedo - jnp.where(lit, own, 0), 0)
+    return xp.maximum(picture.albedo - xp.where(lit, own, 0), 0)
 
 
-def light_in(picture: Picture, *parts: jax.Array | None) -> jax.Array:
+def light_in(picture: Picture, *parts: Array | None) -> Array:
     """The sum of those parts that there are, `(H, W, 3)`."""
-    return sum((part for part in parts if part is not None), jnp.zeros_like(picture.beauty))
+    xp: Any = picture.beauty.__array_namespace__()
+    return sum((part for part in parts if part is not None), xp.zeros_like(picture.beauty))
 
 
-def filter_picture(picture: Picture, unit: jax.Array, samples: jax.Array | float) -> Picture:
+def filter_picture(
+    picture: Picture,
+    unit: Array,
+    samples: Array | float,
+    average: Callable[..., Any] = average,
+) -> Picture:
     """Every layer but the beauty without its noise. unit: brightness of the picture, `()`."""
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
-    del layers["beauty"]
-    unit = jnp.maximum(unit, 1e-12)
+    xp: Any = layers.pop("beauty").__array_namespace__()
+    unit = xp.maximum(unit, 1e-12)
     steering = [steer(name, layer, unit) for name, layer in layers.items() if name in STEERING]
-    filtered = filter_features(steering, list(layers.values()), samples)
+    filtered = filter_features(steering, list(layers.values()), samples, average)
     return picture._replace(**dict(zip(layers, filtered, strict=True)))
 
 
-def steer(name: str, layer: jax.Array, unit: jax.Array) -> jax.Array:
+def steer(name: str, layer: Array, unit: Array) -> Array:
     """A layer so scaled that it varies by about 1. unit: brightness of the picture, `()`."""
     if name in ("emission", "environment"):
-        return coverage(jnp.mean(layer, axis=-1, keepdims=True), unit)
+        return coverage(layer.mean(axis=-1, keepdims=True), unit)
     if name == "albedo":
         return coverage(layer, 1.0)
     return layer if name == "alpha" else layer / 2
 
 
-def firefly_weight(light: jax.Array) -> jax.Array:
+def firefly_weight(light: Array) -> Array:
     """Less than 1 where a pixel is far brighter than those around it, `(H, W)` to `(H, W)`."""
-    light = jnp.where(jnp.isfinite(light), light, 0)
-    side = 2 * AROUND + 1
-    total = lax.reduce_window(light, 0.0, lax.add, (side, side), (1, 1), "SAME")
-    around = jnp.maximum(total - light, 0) / (side**2 - 1)
-    return jnp.minimum(1, FIREFLY * around / jnp.where(light > 0, light, 1))
+    xp: Any = light.__array_namespace__()
+    light = xp.where(xp.isfinite(light), light, 0)
+    around = xp.maximum(combine(light, AROUND, xp.add) - light, 0) / ((2 * AROUND + 1) ** 2 - 1)
+    return xp.minimum(1, FIREFLY * around / xp.where(light > 0, light, 1))

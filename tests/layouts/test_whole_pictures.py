@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import jax
@@ -189,6 +191,14 @@ def test_the_device_gives_the_same(cutout: Frame, clean: tuple) -> None:
     out = np.empty_like(image)
     assert jflnr.Denoiser(FEW, backend="opencl")(cutout, out) is out
     np.testing.assert_array_equal(out, image)
+
+
+def test_the_device_needs_no_jax(source: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyopencl")
+    code = "import sys; from jflnr.cli import main; main(); print('jax' in sys.modules)"
+    argv = ["denoise", str(source), "-o", str(tmp_path / "out.exr"), "--backend", "opencl"]
+    done = subprocess.run([sys.executable, "-c", code, *argv], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "False", done
 
 
 @pytest.mark.parametrize("backend", ["jax", "opencl"])

@@ -1,11 +1,12 @@
 """What surrounds the kernels: devices, reuse, determinism, results left on the device, errors."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from jflnr.opencl import Context, NoDevice, all_devices, flr
+from jflnr.opencl import Context, NoDevice, all_devices, flr, kept
 from jflnr.opencl import context as context_module
 from tests.opencl.conftest import PARAMETERS, scene
 
@@ -46,6 +47,31 @@ def test_odd_arrays_are_read_right(context: Context) -> None:
     target.flags.writeable = False
     found = flr(shifted, guides, PARAMETERS, context=context)
     np.testing.assert_array_equal(found, flr(target, guides, PARAMETERS, context=context))
+
+
+def test_programs_are_kept_with_the_code_of_their_kernels(
+    context: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not context.on_cpu:
+        pytest.skip("only processors' programs are kept")
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))
+    target, guides = scene(20, 30, 2, 1)
+    again = lambda: flr(target, guides, PARAMETERS, context=Context(context.device))
+    right, folder = again(), tmp_path / "opencl"
+    found = sorted(folder.iterdir())
+    assert found
+    with monkeypatch.context() as patch:
+        patch.setattr(Context, "_build", None)
+        np.testing.assert_array_equal(again(), right)
+    for damaged in found:
+        damaged.write_bytes(b"no program")
+    np.testing.assert_array_equal(again(), right)
+    assert all(len(path.read_bytes()) > 100 for path in found)
+    monkeypatch.setattr(kept, "MOST", 0)
+    kept.write(folder / "more", b"one more")
+    assert not list(folder.iterdir())
+    monkeypatch.setenv("POCL_KERNEL_CACHE", "0")
+    assert kept.place_of(context.device, "", []) is None
 
 
 def test_wrong_arguments(context: Context) -> None:

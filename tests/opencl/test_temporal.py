@@ -1,7 +1,6 @@
 """Denoising with a history on a device against `jflnr.temporal`, over short sequences."""
 
 import dataclasses
-import functools
 from collections.abc import Callable
 
 import jax
@@ -13,8 +12,9 @@ from jflnr import temporal
 from jflnr.denoising import SHIPPED_FRAME
 from jflnr.images.inputs import prepare, robust_images
 from jflnr.methods import method_of
-from jflnr.opencl import Context, flnr, flr_adaptive, smooth_guide
+from jflnr.opencl import Context, flnr, flr_adaptive
 from jflnr.opencl import temporal as kernels
+from jflnr.opencl.twins import filters_on
 from jflnr.temporal.change import BLOCK
 from tests.opencl import tolerances
 from tests.opencl.conftest import error
@@ -64,8 +64,8 @@ def test_the_first_frame_is_denoised_as_by_itself(
     frame = jax.tree.map(lambda layer: layer[90:154, 150:246], frame)
     frame = dataclasses.replace(frame, motion=np.zeros((64, 96, 2), np.float32))
     found = kernels.step(kernels.start(frame, context), frame, method, context=context)[1]
-    smooth = functools.partial(smooth_guide, context=context)
-    images = robust_images(*prepare(frame, None, method_of(method))[::-1], smooth=smooth)
+    filters = filters_on(context)
+    images = robust_images(*prepare(frame, None, method_of(method))[::-1], filters=filters)
     right = alone(
         images["target"],
         images["guides"],

@@ -18,6 +18,8 @@ WHOLE = 1e-4
 # Adaptive FLR, against JAX in float32, whose ridge knows the rounding of that: windows of few
 # pixels, more guides, and what a level adds depends on differences of fits.
 ADAPTIVE = 1e-3
+# Sums of 49 terms, whose weights are exponentials of sums of squares.
+EDGES = 1e-5
 # BMFR, fed the same noise: what features that nearly depend on each other do to a fit of few
 # pixels, handed on over a sequence.
 BMFR = 1e-3
