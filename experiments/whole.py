@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 
 import jflnr
 from experiments import data, plots, results
+from experiments.timing import interleaved
 from jflnr.exr import read_channels
 from jflnr.frame import Array, Frame
 from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
@@ -18,6 +21,8 @@ QUESTION = "How near does a whole picture come to Open Image Denoise?"
 MINUTES = 15
 
 SAMPLES = 1, 4, 16, 64
+SIZES = (360, 640), (1080, 1920)
+REPEATS = 4
 
 
 def folders() -> list[Path]:
@@ -41,7 +46,32 @@ def run(quick: bool) -> dict[str, Any]:
             print("  {picture}, {spp} spp: {ours_psnr:.2f} dB, OIDN {clean_psnr:.2f}".format(**row))
             rows.append(row)
     rows.sort(key=lambda row: row["spp"])
-    return {"pictures": [*rows, *means(rows)]}
+    return {"pictures": [*rows, *means(rows)], "times": times(quick)}
+
+
+def times(quick: bool) -> list[dict[str, Any]]:
+    """Seconds of a picture, repeated to each size, in OpenCL beside Open Image Denoise."""
+    frame = jflnr.read_frame(folders()[0] / "4spp.exr")
+    repeats, sizes = (1, SIZES[:1]) if quick else (REPEATS, SIZES)
+    return [
+        {"size": f"{w} x {h}"} | interleaved(calls(repeated(frame, h, w)), repeats)
+        for h, w in sizes
+    ]
+
+
+def repeated(frame: Frame, height: int, width: int) -> Frame:
+    """As often side by side as fills so many pixels."""
+    down, across = (-(-n // m) for n, m in zip((height, width), frame.depth.shape, strict=False))
+    return frame.map(lambda a: np.tile(a, (down, across, 1))[:height, :width].copy())
+
+
+def calls(frame: Frame) -> dict[str, Callable[[], Any]]:
+    """Ours on the device, and OIDN as in `images`."""
+    return {
+        "ours": functools.partial(jflnr.Denoiser("picture", backend="opencl"), frame),
+        "raw": lambda: oidn(color=frame.beauty, **auxiliaries(frame)),
+        "clean": lambda: best_of_oidn(frame),
+    }
 
 
 def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -42,20 +42,21 @@ def find_detail(
     `features.average`, or that of a device.
     """
     xp: Any = fitted.__array_namespace__()
-    unit = xp.maximum(unit, 1e-12)
-    scale = xp.mean(fitted, axis=-1, keepdims=True) + DARK * unit
-    left = xp.moveaxis((noisy - fitted) / scale, -1, 0)
+    unit = xp.maximum(unit[..., 0], 1e-12)
+    noisy, fitted = (xp.moveaxis(image, -1, 0) for image in (noisy, fitted))
+    scale = xp.mean(fitted, axis=0) + DARK * unit
+    left = (noisy - fitted) / scale
     usable = xp.all(xp.isfinite(left), axis=0)
     left = xp.where(usable, left * weight, 0)
     follow = xp.concatenate([left, xp.mean(left**2, axis=0, keepdims=True)])
-    steer = xp.where(usable, xp.moveaxis(xp.log1p(fitted / unit), -1, 0), 0)
-    number, (*mean, square) = average(steer, follow, usable, ALIKE)
-    detail = xp.stack(mean, axis=-1)
-    signal = xp.mean(detail**2, axis=-1)
+    steer = xp.where(usable, xp.log1p(fitted / unit), 0)
+    number, averages = average(steer, follow, usable, ALIKE)
+    detail, square = averages[:3], averages[3]
+    signal = xp.mean(detail**2, axis=0)
     noise = xp.maximum(square - signal, 0) / xp.maximum(number - 1, FEWEST)
     found = shrink(xp.stack([signal, signal - noise], axis=-1), BLOCK)
     share = xp.maximum(found[..., 1], 0) / xp.maximum(found[..., 0], 1e-30)
-    return enlarge(share, BLOCK, usable.shape)[..., None] * detail * scale
+    return xp.moveaxis(enlarge(share, BLOCK, usable.shape) * detail * scale, 0, -1)
 
 
 def enlarge(blocks: Array, block: int, size: tuple[int, int]) -> Array:

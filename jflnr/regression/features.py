@@ -145,7 +145,7 @@ def coverage(image: Array, least: Array | float) -> Array:
     as bright, `()`. Returns `(H, W, C)`, about 0 to 1.
     """
     xp: Any = image.__array_namespace__()
-    peak = xp.max(xp.where(xp.isfinite(image), image, 0), axis=-1)
+    peak = xp.max(xp.moveaxis(xp.where(xp.isfinite(image), image, 0), -1, 0), axis=0)
     peak = combine(peak, REACH, xp.maximum)
     return image / xp.maximum(blur(blur(peak[None]))[0], least)[..., None]
 

@@ -305,7 +305,8 @@ def filter_picture(
 def steer(name: str, layer: Array, unit: Array) -> Array:
     """A layer so scaled that it varies by about 1. unit: brightness of the picture, `()`."""
     if name in ("emission", "environment"):
-        return coverage(layer.mean(axis=-1, keepdims=True), unit)
+        red, green, blue = (layer[..., c : c + 1] for c in range(3))
+        return coverage((red + green + blue) / 3, unit)
     if name == "albedo":
         return coverage(layer, 1.0)
     return layer if name == "alpha" else layer / 2
