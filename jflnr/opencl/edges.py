@@ -33,7 +33,7 @@ def average(
     ]
     defines |= {"STEERING": len(steer), "FOLLOWING": len(follow), "REACH": REACH}
     arguments = (width, height, WIDTH**-2, NEAR**-2, near, tensor, values, counts, alike, *outputs)
-    context.run("average", "edges.cl", defines, size, arguments)
+    context.run("average", "edges.cl", defines, size, arguments, alone=True)
     for output, result in zip(outputs, results, strict=True):
         context.finish(output, result)
     return results

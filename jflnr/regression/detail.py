@@ -43,7 +43,7 @@ def find_detail(
     """
     xp: Any = fitted.__array_namespace__()
     unit = xp.maximum(unit[..., 0], 1e-12)
-    noisy, fitted = (xp.moveaxis(image, -1, 0) for image in (noisy, fitted))
+    noisy, fitted = (xp.stack([a[..., c] for c in range(3)]) for a in (noisy, fitted))
     scale = xp.mean(fitted, axis=0) + DARK * unit
     left = (noisy - fitted) / scale
     usable = xp.all(xp.isfinite(left), axis=0)

@@ -145,7 +145,9 @@ def coverage(image: Array, least: Array | float) -> Array:
     as bright, `()`. Returns `(H, W, C)`, about 0 to 1.
     """
     xp: Any = image.__array_namespace__()
-    peak = xp.max(xp.moveaxis(xp.where(xp.isfinite(image), image, 0), -1, 0), axis=0)
+    # numpy is slow to go over the last axis.
+    peaks = (image[..., c] for c in range(image.shape[-1]))
+    peak = functools.reduce(xp.maximum, (xp.where(xp.isfinite(a), a, 0) for a in peaks))
     peak = combine(peak, REACH, xp.maximum)
     return image / xp.maximum(blur(blur(peak[None]))[0], least)[..., None]
 
