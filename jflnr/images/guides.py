@@ -62,10 +62,18 @@ def scene_from(sample: Frame, middle: Array | None) -> Scene:
     scene = Scene(typical_depth(sample.depth, sample.mask), middle)
     if sample.beauty is None:
         return scene
-    light = xp.nanmean(xp.asarray(sample.beauty, dtype=xp.float32))
+    light = mean_light(sample.beauty)
     own = [layer for layer in (sample.emitted, sample.environment) if layer is not None]
     lit = holds_light(sample.seen_albedo, sum(own, xp.zeros_like(light)))
     return Scene(*scene[:2], light, antialiased(sample.normal), lit)
+
+
+def mean_light(beauty: Array) -> Any:
+    """Mean of what is finite, `()`; 0 if nothing is."""
+    xp: Any = beauty.__array_namespace__()
+    finite = xp.isfinite(beauty)
+    total = xp.sum(xp.where(finite, xp.asarray(beauty, dtype=xp.float32), 0))
+    return total / xp.maximum(xp.sum(finite), 1).astype(total.dtype)
 
 
 def thinning(height: int, width: int) -> int:

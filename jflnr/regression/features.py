@@ -119,8 +119,7 @@ def filter_features(
     steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
     following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
     finite in either is left out of the averages, and gets that of its neighbours.
-    samples: per pixel, that either is made of, or `(H, W, 1)`. average: that of a
-    device.
+    samples: per pixel, that either is made of, or `(H, W, 1)`. average: that above, or of a device.
     Returns the features of `following`.
     """
     xp: Any = steering[0].__array_namespace__()

@@ -13,11 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from jflnr.frame import Array, Frame
-from jflnr.images.guides import FAR, Scene, draw_near, scene_of
+from jflnr.images.guides import FAR, Scene, draw_near, mean_light, scene_of
 from jflnr.images.inputs import same_size
 from jflnr.images.noisy_guides import FILTERS, Filters, antialiased, holds_light
-from jflnr.lazy import jax, jit, jnp, pytree
+from jflnr.lazy import jax, jit, pytree
 from jflnr.regression.adaptive import AdaptiveFLR, light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH, find_detail
@@ -42,6 +44,8 @@ LEAST_ALPHA = 0.02
 FIREFLY, AROUND = 20, 3
 # Guides of the lobes, which are fitted coarsely: normal, albedo and normal of what is seen.
 LOBE_GUIDES = 3
+# On a device numpy does what JAX does elsewhere: pixels that are not finite are no mistake.
+QUIETLY = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 # Pixels beyond any frame.
 EVERYTHING = 1 << 20
 
@@ -169,6 +173,7 @@ class WholePicture(AdaptiveFLR):
             raise ValueError("lobes are made of light passes with their colours: there are none")
         return self
 
+    @QUIETLY
     def images(
         self,
         frame: Frame,
@@ -209,7 +214,7 @@ def denoise_picture(
     method: constants and options, without `lobes`; options: fields of it to replace. samples: as of
     `cleaned`.
     """
-    unit, averaged = jnp.nanmean(picture.beauty), antialiased(picture.normal)
+    unit, averaged = mean_light(picture.beauty), antialiased(picture.normal)
     clean = cleaned(picture, unit, samples, averaged)
     lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
     images = images_of(picture, clean, unit, lit)
@@ -217,6 +222,7 @@ def denoise_picture(
     return clean._replace(beauty=given["image"][..., :3])
 
 
+@QUIETLY
 def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
     """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`; its error; and its light passes, as
     in `Frame.lobes`, their colours, and what is emitted and seen of the environment, as planes of

@@ -193,6 +193,18 @@ def test_the_device_gives_the_same(cutout: Frame, clean: tuple) -> None:
     np.testing.assert_array_equal(out, image)
 
 
+@pytest.mark.filterwarnings("error")
+def test_the_device_takes_pixels_that_are_not_finite_without_a_word(cutout: Frame) -> None:
+    pytest.importorskip("pyopencl")
+    layers = {name: np.array(getattr(cutout, name)) for name in ("beauty", "seen_albedo", "alpha")}
+    for k, layer in enumerate(layers.values()):
+        layer[5 + k, 7], layer[20, 9 + k] = np.nan, np.inf
+    frame = dataclasses.replace(cutout, **layers)
+    found, right = (jflnr.denoise(frame, FEW, backend=backend) for backend in ("opencl", "jax"))
+    assert np.isfinite(right).all()
+    np.testing.assert_allclose(found, right, atol=2e-3 * right.max())
+
+
 def test_the_device_needs_no_jax(source: Path, tmp_path: Path) -> None:
     pytest.importorskip("pyopencl")
     code = "import sys; from jflnr.cli import main; main(); print('jax' in sys.modules)"
