@@ -11,9 +11,11 @@ import numpy as np
 
 import jflnr
 from experiments import data, plots, results
+from experiments.peers import oidn
 from experiments.timing import interleaved
 from jflnr.exr import read_channels
 from jflnr.frame import Array, Frame
+from jflnr.methods import PICTURES
 from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
 
 NAME = "whole"
@@ -43,7 +45,10 @@ def run(quick: bool) -> dict[str, Any]:
             row: dict[str, Any] = {"spp": spp, "picture": folder.name}
             for name, image in images(frame).items():
                 row |= {f"{name}_{key}": x for key, x in metrics(image, *halves).items()}
-            print("  {picture}, {spp} spp: {ours_psnr:.2f} dB, OIDN {clean_psnr:.2f}".format(**row))
+            said = (
+                "  {picture}, {spp} spp: {ours_psnr:.2f}, {flnr_psnr:.2f}, OIDN {clean_psnr:.2f} dB"
+            )
+            print(said.format(**row))
             rows.append(row)
     rows.sort(key=lambda row: row["spp"])
     return {"pictures": [*rows, *means(rows)], "times": times(quick)}
@@ -66,11 +71,12 @@ def repeated(frame: Frame, height: int, width: int) -> Frame:
 
 
 def calls(frame: Frame) -> dict[str, Callable[[], Any]]:
-    """Ours on the device, and OIDN as in `images`."""
+    """Ours on the device, without and with the network, and OIDN as in `images`."""
+    ours = (functools.partial(jflnr.Denoiser(m, backend="opencl"), frame) for m in PICTURES)
     return {
-        "ours": functools.partial(jflnr.Denoiser("picture", backend="opencl"), frame),
-        "raw": lambda: oidn(color=frame.beauty, **auxiliaries(frame)),
-        "clean": lambda: best_of_oidn(frame),
+        **dict(zip(("ours", "flnr"), ours, strict=True)),
+        "raw": lambda: oidn.layers(color=frame.beauty, **auxiliaries(frame)),
+        "clean": lambda: oidn.prefiltered(frame.beauty, **auxiliaries(frame)),
     }
 
 
@@ -96,47 +102,20 @@ def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def images(frame: Frame) -> dict[str, Array]:
-    """Noisy, ours, and OIDN with auxiliaries as they are and prefiltered."""
+    """Noisy, ours without and with the network, and OIDN with auxiliaries as they are and
+    prefiltered."""
+    ours = (jflnr.denoise(frame, method)[..., :3] for method in PICTURES)
     return {
         "noisy": frame.beauty,
-        "ours": jflnr.denoise(frame)[..., :3],
-        "raw": oidn(color=frame.beauty, **auxiliaries(frame)),
-        "clean": best_of_oidn(frame),
+        **dict(zip(("ours", "flnr"), ours, strict=True)),
+        "raw": oidn.layers(color=frame.beauty, **auxiliaries(frame)),
+        "clean": oidn.prefiltered(frame.beauty, **auxiliaries(frame)),
     }
-
-
-def best_of_oidn(frame: Frame) -> np.ndarray:
-    """OIDN with prefiltered auxiliaries, `(H, W, 3)`."""
-    clean = {name: oidn(**{name: layer}) for name, layer in auxiliaries(frame).items()}
-    return oidn(color=frame.beauty, **clean, cleanAux=True)
 
 
 def auxiliaries(frame: Frame) -> dict[str, Any]:
     """What OIDN reads besides the colour."""
     return {"albedo": np.clip(np.asarray(frame.seen_albedo), 0, 1), "normal": frame.seen_normal}
-
-
-def oidn(*, cleanAux: bool = False, **layers: Any) -> np.ndarray:
-    """OIDN on one layer, or on a colour with auxiliaries; the argument is named as its option."""
-    import pyoidn
-
-    device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
-    device.commit()
-    network = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
-    given = {name: np.ascontiguousarray(layer, np.float32) for name, layer in layers.items()}
-    given["output"] = result = np.zeros_like(next(iter(given.values())))
-    for name, image in given.items():
-        network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
-    network.set_bool("hdr", "color" in layers)
-    network.set_bool("cleanAux", cleanAux)
-    network.commit()
-    network.execute()
-    error = device.get_error()
-    network.release()
-    device.release()
-    if error is not None:
-        raise RuntimeError(f"OIDN: {error}")
-    return result
 
 
 def metrics(image: Array, first: np.ndarray, second: np.ndarray) -> dict[str, float | None]:

@@ -168,8 +168,7 @@ class Denoiser:
         from jflnr.opencl.twins import filters_on
 
         images = method.images(inputs, names, filters=filters_on(self.context))
-        light = self._on_device(method)(images, out)
-        return light if out is not None else _given({"image": light}, frame, None)
+        return _given(self._on_device(method)(images, out), frame, out)
 
     @_own_settings
     def next(self, frame: Frame, out: np.ndarray | None = None) -> Any:
@@ -191,7 +190,7 @@ class Denoiser:
             return self._device
         return default_context() if self._device is None else Context(self._device)
 
-    def _on_device(self, method: Any) -> Callable[..., Any]:
+    def _on_device(self, method: Any) -> Callable[..., Parts]:
         from jflnr.opencl import twins
 
         return lambda images, out=None: twins.regress(method, images, self.context, out=out)
@@ -261,6 +260,7 @@ def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[
     else:
         arrays = [jax.numpy.asarray(array) for array in arrays]
     if out is not None:
-        np.copyto(out, arrays[0], casting="same_kind")
+        if arrays[0] is not out:
+            np.copyto(out, arrays[0], casting="same_kind")
         arrays[0] = out
     return arrays[0] if len(arrays) == 1 else tuple(arrays)

@@ -28,6 +28,7 @@ HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "flr": ("jflnr.regression.flr", "FLR", {}),
     "flr-adaptive": ("jflnr.regression.adaptive", "AdaptiveFLR", {}),
     "picture": ("jflnr.regression.picture", "WholePicture", {}),
+    "flnr-picture": ("jflnr.network.picture", "PictureFLNR", {}),
     "flnr-small": ("jflnr.network.flnr", "FLNR", {"size": "small"}),
     "flnr": ("jflnr.network.flnr", "FLNR", {}),
     "bmfr": ("jflnr.bmfr.pipeline", "BMFR", {}),
@@ -35,8 +36,9 @@ HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
 }
 # What denoises a frame if nobody says: pictures of other programs are denoised whole.
 DEFAULT, WHOLE = "flr", "picture"
-# Those of indirect light, which every frame has.
-METHODS = tuple(name for name in HOMES if name != WHOLE)
+# Those of whole pictures, and those of indirect light, which every frame has.
+PICTURES = (WHOLE, "flnr-picture")
+METHODS = tuple(name for name in HOMES if name not in PICTURES)
 BACKENDS = ("jax", "opencl")
 
 

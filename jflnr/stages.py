@@ -72,10 +72,12 @@ def on_frame(method: Any, frame: Any, names: tuple[str, ...]) -> Parts:
     return regress(method, method.images(frame, names))
 
 
-def compose(method: Any, parts: Parts, known: Known | None = None) -> Any | None:
-    """The picture with `image`, denoised light, in it; None for a method of light alone.
+def compose(method: Any, parts: Parts, known: Known | None = None) -> Parts:
+    """`image`, denoised light, put into the picture, and what else the last stage gives; nothing
+    for a method of light alone.
 
     parts: what the method's `images` made, and the light. known: what the method takes besides.
     """
     stages = [stage for stage in method.stages() if stage.composes]
-    return run(stages, method, parts, known or {})[0]["image"] if stages else None
+    found = run(stages, method, parts, known or {})[0]
+    return {name: found[name] for stage in stages[-1:] for name in stage.names}

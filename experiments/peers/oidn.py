@@ -73,3 +73,30 @@ def denoise(
     network.release()
     device.release()
     return image
+
+
+def layers(*, cleanAux: bool = False, **images: Any) -> np.ndarray:
+    """OIDN on one layer, or on a colour with auxiliaries; the argument is named as its option."""
+    device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
+    device.commit()
+    network = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
+    given = {name: np.ascontiguousarray(layer, np.float32) for name, layer in images.items()}
+    given["output"] = result = np.zeros_like(next(iter(given.values())))
+    for name, image in given.items():
+        network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+    network.set_bool("hdr", "color" in images)
+    network.set_bool("cleanAux", cleanAux)
+    network.commit()
+    network.execute()
+    error = device.get_error()
+    network.release()
+    device.release()
+    if error is not None:
+        raise RuntimeError(f"OIDN: {error}")
+    return result
+
+
+def prefiltered(colour: Any, **auxiliaries: Any) -> np.ndarray:
+    """OIDN on a picture `(H, W, 3)` with auxiliary layers that it has filtered before."""
+    clean = {name: layers(**{name: layer}) for name, layer in auxiliaries.items()}
+    return layers(color=colour, **clean, cleanAux=True)

@@ -20,7 +20,8 @@ def draw(folder: Path) -> None:
     source = data.folder().parent / "pictures" / "living"
     frame = jflnr.read_frame(source / f"{SAMPLES}spp.exr")
     reference = np.mean(whole.references(source / "reference.exr"), axis=0)
-    rows = (frame.beauty, jflnr.denoise(frame)), (whole.best_of_oidn(frame), reference)
+    others = whole.images(frame)
+    rows = (frame.beauty, others["flnr"]), (others["clean"], reference)
     scale = exposure(reference)
     shown = [np.concatenate([display(np.asarray(x), scale) for x in row], axis=1) for row in rows]
     with replacing(folder / "whole.jpg") as beside:

@@ -104,7 +104,7 @@ def _film(
 ) -> Film:
     """A film that is exposed about as a person would, a part of those under a sky transparent."""
     shading = Shading.of(made.scene, made.finishes)
-    transparent = bool(rng.random() < 0.15)
+    transparent = bool(rng.random() < 0.3)
     pilot = Film(made.scene, camera, width, height, shading, lens, transparent, PILOT)
     light = pilot.sample(4, seed)["beauty"].mean(-1)
     blocks = light[: height // 8 * 8, : width // 8 * 8]

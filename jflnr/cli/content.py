@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jflnr import layouts
-from jflnr.methods import WHOLE
+from jflnr.methods import PICTURES
 
 if TYPE_CHECKING:
     from jflnr.denoising import Denoiser
@@ -45,7 +45,7 @@ def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
     from jflnr.frame import composite
 
     image = np.asarray(given["image"], np.float32)
-    if method.name == WHOLE:
+    if method.name in PICTURES:
         shining = 0 if frame.emitted is None else frame.emitted
         if frame.environment is not None:
             seen = 1 if frame.alpha is None else frame.alpha == 1
@@ -98,7 +98,7 @@ class Pixels:
     def add(self, frame: "Frame", method: Any, picture: np.ndarray) -> None:
         from jflnr.frame import not_finite
 
-        whole = method.name == WHOLE
+        whole = method.name in PICTURES
         names = method.features if whole else layouts.LAYERS
         counts = not_finite(frame)
         self.not_finite.update({name: n for name, n in counts.items() if name in names})

@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--error-map",
         action="store_true",
-        help="with flr-adaptive, flnr and picture: add the standard error as the layer `error`",
+        help="with flr-adaptive, picture and flnr...: add the standard error as the layer `error`",
     )
     add("--lobes", action="store_true", help="with picture: clean every light pass too")
     add("--temporal", action="store_true", help="use the frames before: a folder is a shot")

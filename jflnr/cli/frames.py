@@ -24,7 +24,7 @@ from jflnr.cli.content import (
     warnings_of,
 )
 from jflnr.cli.jobs import Job, make_folder
-from jflnr.methods import DEFAULT, WHOLE, method_of
+from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
@@ -81,7 +81,7 @@ class Worker:
 
     def denoiser_for(self, frame: "Frame", tile: int | None) -> "jflnr.Denoiser":
         """The one for a frame, which also cleans light passes if they are asked for."""
-        whole = self.denoiser.method_for(frame).name == WHOLE
+        whole = self.denoiser.method_for(frame).name in PICTURES
         if self.arguments.lobes and not whole:
             raise ValueError("--lobes is for pictures of other programs and --method picture")
         asked = self.arguments.lobes or (
@@ -167,7 +167,7 @@ class Worker:
             assert tile is not None
             return _record(job) | denoise_in_strips(job, self.denoiser, arguments, tile)
         method = self.denoiser.method_for(frame)
-        if arguments.reference and (frame.reference is None or method.name == WHOLE):
+        if arguments.reference and (frame.reference is None or method.name in PICTURES):
             raise ValueError(
                 f"{job.source}: --reference needs a layer reference, and there is none for what "
                 f"{method.name} denoises"

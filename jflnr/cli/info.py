@@ -12,7 +12,7 @@ import numpy as np
 
 from jflnr import exr, layouts
 from jflnr.cli.common import add_map, table, to_json
-from jflnr.methods import WHOLE, default_of
+from jflnr.methods import PICTURES, default_of
 
 EXAMPLES = """\
   jflnr info render.exr
@@ -107,7 +107,7 @@ def _use(source: layouts.Source) -> dict[str, Any]:
 
     frame = Frame(**images)  # type: ignore[arg-type]
     method = default_of(frame)
-    whole = method == WHOLE
+    whole = method in PICTURES
     pixels, why = layouts.denoised(images, whole)
     present = [layer for layer, image in images.items() if image is not None]
     named = {n: c for n, c in layout.channels.items() if set(c) <= set(source.channels)}
@@ -132,7 +132,7 @@ def _use_text(use: dict[str, Any]) -> list[str]:
     if not use["usable"]:
         return [f"layout: {use['layout']}; jflnr denoise cannot use it: {use['why']}", *notes]
     light = exr.layer_of(use["channels"][use["light"]][0]) or "plain R, G, B"
-    if whole := use["method"] == WHOLE:
+    if whole := use["method"] in PICTURES:
         noisy = [f"the whole picture, {light}"]
     else:
         noisy = [f"indirect_{spp} (--spp {spp})" for spp in use["spp"]] or [light]

@@ -12,14 +12,14 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
 
     Without a method it is None, and each frame gets its own, unless other options are of one.
     """
-    from jflnr.methods import DEFAULT, WHOLE, method_of
+    from jflnr.methods import DEFAULT, PICTURES, method_of
 
     name = arguments.method
     if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
         name = DEFAULT
-    told = ("flr-adaptive", "flnr", "flnr-small", WHOLE)
-    if arguments.error_map and (name not in told or arguments.backend != "jax"):
-        raise ValueError(f"--error-map needs --method {', '.join(told)}, on the jax backend")
+    told = ("flr-adaptive", "flnr", "flnr-small", *PICTURES)
+    if arguments.error_map and name not in told:
+        raise ValueError(f"--error-map needs --method {', '.join(told)}")
     if arguments.profile and arguments.backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
     if arguments.explain and name != "auto":
@@ -52,7 +52,7 @@ def _load(arguments: argparse.Namespace, method: Any) -> tuple[Any, dict[str, An
     if hasattr(method, "params"):
         from jflnr.network import weights
 
-        return method_of(method, params=weights.load(arguments.params)[0]), {}
+        return method_of(method, params=weights.load(arguments.params, method.read)[0]), {}
     if method.name not in METHODS:
         raise ValueError(f"--params is not for --method {method.name}, which finds its own")
     fitted, about = load_parameters(arguments.params)

@@ -1,12 +1,13 @@
-"""train: train the network of the method flnr on frames of your own.
+"""train: train the network of the methods flnr and flnr-picture on frames of your own.
 
 FRAMES need the layers that `jflnr denoise` needs, several noisy layers (indirect_1, indirect_1_b,
-indirect_4, ...) and `reference`, or `target`, what to learn instead. Folders are searched for .exr
-files. OUT is a file of weights for `jflnr denoise --method flnr --params OUT`. Beside it OUT.state
+indirect_4, ...; of whole pictures beauty_1, ... and their auxiliary layers) and `reference`, or
+`target`, what to learn instead. Folders are searched for .exr files. OUT is a file of weights for
+`jflnr denoise --method flnr --params OUT`. Beside it OUT.state
 holds the run, which goes on from there when the command is given again, and OUT.png the curves,
 where matplotlib is installed. After Ctrl-C, OUT and OUT.state are written too. The frames under
 about twenty realisations of their noise are kept in the folder of --cache, 17 MB for 320 x 184
-pixels.
+pixels, 60 MB for pictures.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from jflnr.cli.jobs import check_apart, expand, make_folder
 if TYPE_CHECKING:
     from jflnr.network.train import Progress, Result, Settings
 
+TRAINED = ("flnr", "flnr-small", "flnr-picture")
 UNITS = {"s": 1, "m": 60, "h": 3600}
 
 EXAMPLES = """\
@@ -33,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--data", metavar="FRAMES", nargs="+", type=Path, required=True, help="frames, folders")
     add("--val", metavar="FRAMES", nargs="+", type=Path, default=[], help="frames to choose by")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help=".npz file to write")
-    add("--size", default="base", help="small or base: of the network (base)")
+    add("--method", default="flnr", metavar="M", help=f"{', '.join(TRAINED)} (flnr)")
     add("--time", type=seconds, default="1h", metavar="T", help="how long, such as 90s or 3h (1h)")
     add("--steps", type=int, metavar="N", help="stop after N steps at the latest")
     add("--batch", type=int, default=8, metavar="N", help="crops per step (8)")
@@ -54,10 +56,11 @@ def seconds(text: str) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     from jflnr import checks
+    from jflnr.methods import method_of
     from jflnr.network import examples
-    from jflnr.network.train import SIZES, Settings, train
+    from jflnr.network.train import WIDTHS, Settings, train
 
-    checks.choice("--size", arguments.size, tuple(SIZES))
+    checks.choice("--method", arguments.method, TRAINED)
     for name in ("batch", "every"):
         checks.positive_integer(f"--{name}", getattr(arguments, name))
     output: Path = arguments.output
@@ -71,9 +74,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.overwrite:
         state.unlink(missing_ok=True)
     folder = arguments.cache or output.with_name(output.name + ".frames")
-    records = [examples.prepared(path, folder) for path in _shown(paths)]
+    method = method_of(arguments.method)
+    records = [examples.prepared(path, folder, method) for path in _shown(paths)]
     settings = Settings(
-        widths=SIZES[arguments.size],
+        method=method,
+        widths=WIDTHS[arguments.method],
         seed=arguments.seed,
         batch=arguments.batch,
         rate=arguments.rate,
@@ -125,6 +130,7 @@ def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence
         output,
         result.params,
         settings.widths,
+        settings.method.read,
         frames=len(paths),
         scenes=len({path.stem.rsplit("_", 1)[0] for path in paths}),
         data=examples.digest(paths),

@@ -14,9 +14,9 @@ SHARE = 0.5
 # is denoised whole, of a frame that waits in pieces, and of a piece with what it overlaps. For flnr
 # counted, not measured: 28 bytes of its light, error and result; all that its network reads.
 BASE = 450 * 2**20
-WHOLE = {"flr": 320, "picture": 5300}
-REST = {"flr": 1, "flr-adaptive": 1, "flnr": 32, "picture": 1}
-PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 400, "picture": 5300}
+WHOLE = {"flr": 320, "picture": 5300, "flnr-picture": 5300}
+REST = {"flr": 1, "flr-adaptive": 1, "flnr": 32, "picture": 1, "flnr-picture": 48}
+PIECE = {"flr": 230, "flr-adaptive": 160, "flnr": 400, "picture": 5300, "flnr-picture": 5300}
 # Smaller pieces would be nearly all overlap.
 SMALLEST = 256
 # The name that glibc's <malloc.h> gives what `keep_freed` sets, and bytes that are kept.

@@ -128,7 +128,8 @@ def overlapping(
 ) -> Iterator[Strip]:
     """The denoised frame in strips that overlap by all that its stages look at together.
 
-    whole: denoises the images of a part. For methods that need no sums over the frame.
+    whole: gives for the images of a part what the last stage does. For methods that need no sums
+    over the frame.
     """
     stages, scene = method.stages(), scene_of(rows)
     if any(stage.totals for stage in stages):
@@ -140,7 +141,8 @@ def overlapping(
     reach = sum(stage.reach for stage in stages) + method.margin
     for piece in pieces(rows.height, max(tile * tile // rows.width, 1), reach, align):
         images = method.images(rows.read(piece.low, piece.high), names, scene)
-        yield piece.start, {"image": np.asarray(whole(images))[piece.kept]}
+        given = whole(images)
+        yield piece.start, {name: np.asarray(part)[piece.kept] for name, part in given.items()}
 
 
 def sparse_images(job: Job) -> Parts:

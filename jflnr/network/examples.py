@@ -5,19 +5,18 @@ import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import jax
 import numpy as np
 
-from jflnr import exr
+from jflnr import exr, layouts
 from jflnr.files import replacing
-from jflnr.frame import Frame, read_frame
-from jflnr.images.inputs import frame_inputs
+from jflnr.frame import Frame, frame_of
+from jflnr.images.inputs import frame_inputs, names_of
 from jflnr.metrics import display, exposure
-from jflnr.network import flnr
-from jflnr.network.features import BRIGHTEST, Read
-from jflnr.network.flnr import FLNR, GUIDES, NEEDED
+from jflnr.network.features import BRIGHTEST
+from jflnr.network.flnr import DEFAULT, GUIDES, NEEDED
 from jflnr.stages import run
 
 CROP = 128
@@ -30,148 +29,196 @@ LEAST_ERROR = 3e-4
 # A crop that shows little but sky teaches little.
 LEAST_SURFACE, TRIES = 0.3, 5
 # Change it when prepared frames become others.
-VERSION = 1
-NOISY = re.compile(r"indirect_(\d+)(_[a-z])?\.R")
-OF_NOISE = ("light", "noisy", "error")
+VERSION = 2
+# A channel of a noisy layer: its samples per pixel, and which of several streams it is of.
+NOISY = re.compile(r"(\w+?)_(\d+)(_[a-z])?\.(\w+)")
 
 
 class Example(NamedTuple):
     """One crop under one realisation of the noise.
 
-    albedo: `(H, W, 3)`. target: `(H, W, 3)`, what the light should be, as exposed on the screen.
-    exposure: of what is read. error: of the frame before the network, as displayed.
+    albedo: `(H, W, 3)`, by which the light is multiplied, or `(1, 1, 3)`. target: `(H, W, 3)`, what
+    the light should be, as exposed on the screen. exposure: of what is read. error: of the frame
+    before the network, as displayed.
     """
 
-    read: Read
+    read: Any
     albedo: Any
     target: Any
     exposure: Any
     error: Any
 
 
-def prepared(path: Path, folder: Path) -> np.ndarray:
-    """A frame under about 20 realisations of its noise, each denoised by adaptive FLR.
+def prepared(path: Path, folder: Path, method: Any = DEFAULT) -> np.ndarray:
+    """A frame under about 20 realisations of its noise, each denoised without the network.
 
-    One record in half precision, its fields those of `Example`; made once and kept in `folder`.
-    The target is the layer `target`, or else `reference`.
+    method: `FLNR` or `PictureFLNR`. One record in half precision, its fields those of `Example`;
+    made once and kept in `folder`. The target is the layer `target`, or else `reference`.
     Raises `ValueError` for a frame that lacks a layer or is too small.
     """
     size, time = path.stat().st_size, path.stat().st_mtime_ns
-    key = hashlib.sha256(f"{VERSION} {path.resolve()} {size} {time}".encode())
+    key = hashlib.sha256(f"{VERSION} {method.read.LAYER} {path.resolve()} {size} {time}".encode())
     kept = folder / f"{path.stem}-{key.hexdigest()[:12]}.npy"
     if not kept.exists():
         folder.mkdir(parents=True, exist_ok=True)
+        noisy, random = Noisy.of(path, method), np.random.default_rng([*path.name.encode()])
         with replacing(kept) as beside, beside.open("wb") as file:
-            np.save(file, _record(*layers(path), np.random.default_rng([*path.name.encode()])))
+            np.save(file, _record(noisy, random))
     return np.load(kept, mmap_mode="r")
 
 
-def layers(path: Path) -> tuple[Frame, dict[int, list[np.ndarray]]]:
-    """The frame, its target as `reference`, and its noisy layers by samples per pixel."""
-    channels = exr.read_channels(path)
-    layer = lambda name: np.stack([channels[f"{name}.{c}"] for c in "RGB"], -1).astype(np.float32)
-    found: dict[int, list[np.ndarray]] = {}
-    for name in sorted(channels):
-        if match := NOISY.fullmatch(name):
-            found.setdefault(int(match[1]), []).append(layer(name[:-2]))
-    if not found:
-        raise ValueError(f"{path}: no noisy layer indirect_N")
-    frame = read_frame(path, next(iter(found)))
-    if "target.R" in channels:
-        frame = dataclasses.replace(frame, reference=layer("target"))
-    if frame.reference is None:
-        raise ValueError(f"{path}: needs a layer reference")
-    return frame, found
+Channels: TypeAlias = dict[str, np.ndarray]
 
 
-def realisations(
-    light: dict[int, list[np.ndarray]], random: np.random.Generator
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Samples per pixel and noisy light `(H, W, 3)`: layers, their means, and mixtures.
+@dataclasses.dataclass(frozen=True)
+class Noisy:
+    """A file with several noisy versions of a frame.
 
-    Pixels have random streams of their own, so an image that takes each pixel from one of several
-    is as good a realisation as any of them; without such the network learns the few by heart.
+    method: whose network is to read it. fixed: its channels without noise. streams: by samples per
+    pixel, the noisy ones, all named alike.
     """
-    found = {spp: list(images) for spp, images in light.items()}
-    for spp, images in light.items():
-        if len(images) > 1:
-            found.setdefault(spp * len(images), []).append(np.mean(images, axis=0))
-    for spp, images in sorted(found.items()):
-        yield from ((spp, image) for image in images)
-        if len(images) > 1:
-            for _ in images:
-                chosen = random.integers(len(images), size=(1, *images[0].shape[:2], 1))
-                yield spp, np.take_along_axis(np.stack(images), chosen, axis=0)[0]
+
+    path: Path
+    method: Any
+    attributes: exr.Attributes
+    fixed: Channels
+    streams: dict[int, list[Channels]]
+
+    @classmethod
+    def of(cls, path: Path, method: Any) -> Self:
+        """Raises `ValueError` if there is no noisy layer of what the method denoises."""
+        channels, layer = exr.read_channels(path), method.read.LAYER
+        found: dict[int, dict[str, Channels]] = {}
+        fixed = dict(channels)
+        for name in sorted(channels):
+            match = NOISY.fullmatch(name)
+            if match and f"{layer}_{match[2]}{match[3] or ''}.R" in channels:
+                stream = found.setdefault(int(match[2]), {}).setdefault(match[3] or "", {})
+                stream[f"{match[1]}_{match[2]}.{match[4]}"] = fixed.pop(name)
+        if not found:
+            raise ValueError(f"{path}: no noisy layer {layer}_N")
+        streams = {spp: [*some.values()] for spp, some in found.items()}
+        return cls(path, method, exr.read_attributes(path), fixed, streams)
+
+    def frame(self, spp: int, stream: Channels) -> Frame:
+        """The frame under one realisation of the noise."""
+        channels = self.fixed | stream
+        layout = layouts.source.recognise(channels, spp)
+        return frame_of(layouts.Source(self.path, channels, self.attributes, layout))
+
+    def target(self) -> np.ndarray:
+        """What the light should be, `(H, W, 3)`. Raises `ValueError` if nothing says so."""
+        layer = next((name for name in ("target", "reference") if f"{name}.R" in self.fixed), None)
+        if layer is None:
+            raise ValueError(f"{self.path}: needs a layer reference")
+        return np.stack([self.fixed[f"{layer}.{c}"] for c in "RGB"], -1).astype(np.float32)
+
+    def albedo(self) -> np.ndarray:
+        """What the light is to be multiplied by to be shown, `(H, W, 3)`, or 1 for pictures."""
+        if self.method.read.LAYER == "beauty":
+            return np.ones((1, 1, 3), np.float32)
+        return np.stack([self.fixed[f"albedo.{c}"] for c in "RGB"], -1).astype(np.float32)
+
+    def realisations(self, random: np.random.Generator) -> Iterator[tuple[int, Frame]]:
+        """Samples per pixel, and the frame with a noisy layer, their means, and mixtures.
+
+        Pixels have random streams of their own, so an image that takes each pixel from one of
+        several is as good a realisation as any of them; without such the network learns the few by
+        heart.
+        """
+        found = {spp: list(streams) for spp, streams in self.streams.items()}
+        for spp, streams in self.streams.items():
+            if (count := len(streams)) > 1:
+                renamed = lambda name, to=spp * count, spp=spp: name.replace(f"_{spp}.", f"_{to}.")
+                mean = {
+                    renamed(name): np.mean([s[name] for s in streams], axis=0, dtype=np.float32)
+                    for name in streams[0]
+                }
+                found.setdefault(spp * count, []).append(mean)
+        for spp, streams in sorted(found.items()):
+            yield from ((spp, self.frame(spp, stream)) for stream in streams)
+            if len(streams) > 1:
+                for _ in streams:
+                    shape = next(iter(streams[0].values())).shape
+                    chosen = random.integers(len(streams), size=shape)
+                    pixels = {n: [stream[n] for stream in streams] for n in streams[0]}
+                    mixed = {n: np.choose(chosen, some) for n, some in pixels.items()}
+                    yield spp, self.frame(spp, mixed)
 
 
-def _record(
-    frame: Frame, light: dict[int, list[np.ndarray]], random: np.random.Generator
-) -> np.ndarray:
-    height, width = frame.depth.shape[:2]
+def _record(noisy: Noisy, random: np.random.Generator) -> np.ndarray:
+    read, target = noisy.method.read, noisy.target()
+    height, width = target.shape[:2]
     if min(height, width) < CROP:
         raise ValueError(f"a frame of {width} x {height}; training needs {CROP} x {CROP} at least")
-    albedo, target = np.asarray(frame.albedo), np.asarray(frame.reference)
+    albedo = noisy.albedo()
     scale = exposure(albedo * target)
     wanted = display(albedo * target, scale)
-    fields: dict[str, list[Any]] = {name: [] for name in (*OF_NOISE, "spp", "exposure", "occluded")}
-    errors = []
-    for spp, noisy in realisations(light, random):
+    fields: dict[str, list[Any]] = {name: [] for name in (*read.OF_NOISE, "spp", "exposure")}
+    errors, found = [], None
+    for spp, frame in noisy.realisations(random):
         occluded = frame.ao is not None and random.random() < OCCLUDED
-        read, unit = before_network(dataclasses.replace(frame, indirect=noisy), occluded)
-        for name in OF_NOISE:
-            fields[name].append(getattr(read, name))
+        found, unit = before_network(frame, noisy.method, occluded)
+        for name in read.OF_NOISE:
+            fields[name].append(getattr(found, name))
         fields["spp"].append(spp)
         fields["exposure"].append(unit * scale)
-        fields["occluded"].append(occluded)
-        errors.append(np.mean((display(albedo * read.light, unit * scale) - wanted) ** 2))
-        if occluded or len(errors) == 1:
-            guides = read
-    of_all = {name: np.asarray(getattr(guides, name)) for name in ("normal", "depth", "ao", "mask")}
-    of_all |= {"albedo": albedo, "target": np.clip(target * scale, 0, BRIGHTEST)}
+        errors.append(np.mean((display(albedo * found.light, unit * scale) - wanted) ** 2))
+    still = {name: getattr(found, name) for name in read._fields if name not in read.OF_NOISE}
+    still |= {"by": albedo, "target": np.clip(target * scale, 0, BRIGHTEST)}
     groups = np.searchsorted(list(SHARES), fields["spp"], side="right")
     own = [np.mean([e for e, g in zip(errors, groups, strict=True) if g == k]) for k in groups]
-    found: dict[str, np.ndarray]
-    found = {name: np.asarray(value, np.float16) for name, value in of_all.items()}
-    found |= {name: np.asarray(fields[name], np.float16) for name in OF_NOISE}
-    found |= {"spp": np.array(fields["spp"]), "occluded": np.array(fields["occluded"])}
-    found |= {"exposure": np.array(fields["exposure"], np.float32)}
-    found |= {"own": np.maximum(own, LEAST_ERROR).astype(np.float32), "group": groups}
-    record = np.zeros(1, [(name, value.dtype, value.shape) for name, value in found.items()])
-    for name, value in found.items():
+    images: dict[str, np.ndarray]
+    images = {name: np.asarray(value, np.float16) for name, value in still.items()}
+    images |= {name: np.asarray(fields[name], np.float16) for name in read.OF_NOISE}
+    images |= {"spp": np.array(fields["spp"]), "group": groups}
+    images |= {"exposure": np.array(fields["exposure"], np.float32)}
+    images |= {"before": np.maximum(own, LEAST_ERROR).astype(np.float32)}
+    record = np.zeros(1, [(name, value.dtype, value.shape) for name, value in images.items()])
+    for name, value in images.items():
         record[name][0] = value
     return record
 
 
-def before_network(frame: Frame, occluded: bool = True) -> tuple[Read, float]:
-    """What the network reads of a frame, and the unit of its light.
+def before_network(frame: Frame, method: Any = DEFAULT, occluded: bool = True) -> tuple[Any, float]:
+    """What the network of a method reads of a frame, and the unit of its light.
 
     occluded: with the occlusion that the frame may have.
     """
-    names = GUIDES if occluded and frame.ao is not None else NEEDED
-    read, unit = jax.tree.map(np.asarray, _before(frame_inputs(frame, names), names))
-    return read, float(unit)
+    if hasattr(method, "features"):
+        names = names_of(frame, None, method)
+    else:
+        names = GUIDES if occluded and frame.ao is not None else NEEDED
+    read, unit = jax.tree.map(np.asarray, _before(method, frame_inputs(frame, names), names))
+    return read, float(unit.flat[0])
 
 
 @jax.jit(static_argnames="names")
-def _before(frame: Frame, names: tuple[str, ...]) -> tuple[Read, jax.Array]:
-    method = FLNR(params={})
+def _before(method: Any, frame: Frame, names: tuple[str, ...]) -> tuple[Any, jax.Array]:
     images = method.images(frame, names)
-    stages = method.stages()[:-2]
-    parts, known = run(stages, method, images, method.known(images))
-    return flnr.to_read(parts, known), known["mean"] * known["unit"]
+    parts, known = run(method.before_network(), method, images, method.known(images))
+    return method.to_read(images | parts, known)
 
 
-def draw(record: np.ndarray, random: np.random.Generator) -> Example:
-    """A crop under one realisation, mirrored, transposed and recoloured, its normals turned."""
+def draw(method: Any, record: np.ndarray, random: np.random.Generator) -> Example:
+    """A crop under one realisation, mirrored, transposed and recoloured, its normals turned.
+
+    method: that the record was prepared for.
+    """
+    read, of_noise = method.read, method.read.OF_NOISE
     groups = record["group"][0]
     shares = np.array(list(SHARES.values()))[groups]
     shares /= np.bincount(groups)[groups]
     chosen = random.choice(len(groups), p=shares / shares.sum())
-    height, width = record["mask"].shape[1:3]
+    height, width = record["target"].shape[1:3]
+
+    def image(name: str) -> np.ndarray:
+        return record[name][0, chosen] if name in of_noise else record[name][0]
+
     for _ in range(TRIES):
         top, left = random.integers(height - CROP + 1), random.integers(width - CROP + 1)
         place = slice(top, top + CROP), slice(left, left + CROP)
-        if np.mean(record["mask"][0][place], dtype=np.float32) > LEAST_SURFACE:
+        if np.mean(image(read.COVER)[place], dtype=np.float32) > LEAST_SURFACE:
             break
     axes = tuple(axis for axis in (0, 1) if random.random() < 0.5)
     turned, order = random.random() < 0.5, random.permutation(3)
@@ -180,20 +227,18 @@ def draw(record: np.ndarray, random: np.random.Generator) -> Example:
     rotation = np.linalg.qr(random.normal(size=(3, 3)))[0].astype(np.float32)
 
     def cut(name: str) -> np.ndarray:
-        image = record[name][0, chosen] if name in OF_NOISE else record[name][0]
-        image = np.flip(image[place].astype(np.float32), axes)
-        return image.transpose(1, 0, 2) if turned else image
+        found = image(name)
+        if found.shape[:2] != (1, 1):
+            found = found[place]
+        found = np.flip(found.astype(np.float32), axes)
+        found = found.transpose(1, 0, 2) if turned else found
+        if name in read.DIRECTIONS:
+            return found @ rotation
+        return found[..., order] if name in (*read.COLOURS, "by", "target") else found
 
-    light, noisy, albedo, target = (
-        cut(name)[..., order] for name in ("light", "noisy", "albedo", "target")
-    )
-    mask = cut("mask")
-    ao = cut("ao") if record["occluded"][0, chosen] else mask
-    read = Read(
-        light * tint, noisy * tint, cut("error"), cut("normal") @ rotation, cut("depth"), ao, mask
-    )
-    of_frame = record["exposure"][0, chosen], record["own"][0, chosen]
-    return Example(read, albedo, target * tint, *of_frame)
+    images = {name: cut(name) * (tint if name in read.LIGHT else 1) for name in read._fields}
+    of_frame = record["exposure"][0, chosen], record["before"][0, chosen]
+    return Example(read(**images), cut("by"), cut("target") * tint, *of_frame)
 
 
 def digest(paths: Sequence[Path]) -> str:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from jflnr.lazy import jax, jnp
 
-# Of every pixel, and of every mean.
-PIXEL, POOLED = 15, 6
+# Of every mean.
+POOLED = 6
 # Light below such shares of the frame's mean is as good as dark.
 DARK = 0.02
 # No light is brighter, in means of the frame: squares of fireflies must not overflow.
@@ -25,6 +25,16 @@ class Read(NamedTuple):
     error: standard error of its brightness. depth: over its median. ao: 1 where there is none.
     """
 
+    # How many values are read of a pixel, the guides of a frame that they come from, the noisy
+    # layer of training frames, and the image that says where there is something.
+    PIXEL = 15
+    GUIDES = ("normal", "depth", "ao")
+    LAYER, COVER = "indirect", "mask"
+    # What changes with the noise, and the images that are colours, light, and directions.
+    OF_NOISE = ("light", "noisy", "error", "ao")
+    COLOURS = LIGHT = ("light", "noisy")
+    DIRECTIONS = ("normal",)
+
     light: Any
     noisy: Any
     error: Any
@@ -33,36 +43,40 @@ class Read(NamedTuple):
     ao: Any
     mask: Any
 
+    def pixels(self) -> jax.Array:
+        """What is read of every pixel, `(H, W, 15)`."""
+        light, noisy = luminance(self.light), luminance(self.noisy)
+        residual = (noisy - light) / (light + 0.05)
+        planes = [
+            jnp.log(light + DARK),
+            jnp.clip(residual, -1, 4) / 2,
+            jnp.log1p((noisy + 0.05) / (light + 0.05)),
+            jnp.log(self.error / (light + 0.05) + 0.01) + 1.5,
+            jnp.log((self.light + DARK) / (light + DARK)),
+            self.normal,
+            jnp.log(self.depth + 0.05),
+            2 * self.ao - 1,
+            jnp.minimum(self.error, 3),
+            self.mask,
+            jnp.log(noisy + 0.03),
+        ]
+        return jnp.concatenate(planes, axis=-1)
+
+    def corrected(self, gains: jax.Array) -> jax.Array:
+        """The light by what the network says of it, `(H, W, 3)` both."""
+        return self.light * gains
+
 
 def luminance(light: jax.Array) -> jax.Array:
     """`(H, W, 3)` to `(H, W, 1)`."""
     return light @ jnp.asarray(LUMINANCE, light.dtype)[:, None]
 
 
-def of_pixels(read: Read) -> jax.Array:
-    """`(H, W, PIXEL)`."""
-    light, noisy = luminance(read.light), luminance(read.noisy)
-    residual = (noisy - light) / (light + 0.05)
-    planes = [
-        jnp.log(light + DARK),
-        jnp.clip(residual, -1, 4) / 2,
-        jnp.log1p((noisy + 0.05) / (light + 0.05)),
-        jnp.log(read.error / (light + 0.05) + 0.01) + 1.5,
-        jnp.log((read.light + DARK) / (light + DARK)),
-        read.normal,
-        jnp.log(read.depth + 0.05),
-        2 * read.ao - 1,
-        jnp.minimum(read.error, 3),
-        read.mask,
-        jnp.log(noisy + 0.03),
-    ]
-    return jnp.concatenate(planes, axis=-1)
-
-
-def of_means(read: Read, scales: int) -> list[jax.Array]:
+def of_means(read: Any, scales: int) -> list[jax.Array]:
     """What is left in the means: noisy over denoised light, and the noise.
 
-    The noisy light also without what exceeds the denoised one four times.
+    read: with `light` and `noisy`, `(H, W, 3)`. The noisy light also without what exceeds the
+    denoised one four times.
     Returns `(H / n, W / n, POOLED)` for n = 2, 4, ..., the last of which divides H and W.
     """
     light, noisy = luminance(read.light), luminance(read.noisy)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from jflnr.frame import Frame
 from jflnr.images.guides import Scene
@@ -27,12 +27,37 @@ from jflnr.regression.moments import Guides
 from jflnr.stages import Known, Parts, Stage
 
 # Guides that the network was trained with: normal (3), depth and, where a frame has it, occlusion.
-NEEDED, GUIDES = ("normal", "depth"), ("normal", "depth", "ao")
+NEEDED, GUIDES = ("normal", "depth"), features.Read.GUIDES
 COLOURS = 3
-# Least and largest of the guides' channels that the network sees.
-LIMITS = ((-1, -1, -1, 0, 0), (1, 1, 1, 100, 1))
+# The largest depth that the network sees, over the median; least and largest of all guides.
+DEEPEST = 100
+LIMITS = ((-1, -1, -1, 0, 0), (1, 1, 1, DEEPEST, 1))
 # Logarithm of the largest factor on the light.
 LARGEST = 1.5
+
+
+def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
+    """The images that the network reads, from those of adaptive FLR and its results, and the unit
+    of their light."""
+    target, guides = parts["target"], jnp.concatenate(layers_of(parts["guides"]), axis=-1)
+    usable = jnp.all(jnp.isfinite(target), axis=-1) & jnp.all(jnp.isfinite(guides), axis=-1)
+    if parts["weight"] is not None:
+        usable &= parts["weight"] > 0
+    usable = usable[..., None]
+    unit = known["mean"] * known["unit"]
+
+    def shown(image: jax.Array) -> jax.Array:
+        return jnp.where(usable, jnp.clip(image / unit, 0, features.BRIGHTEST), 0)
+
+    groups = (*target.shape[:2], target.shape[2] // COLOURS, COLOURS)
+    light, noisy = (x.reshape(groups).sum(2) for x in (parts["fitted"], target))
+    lowest, highest = jnp.asarray(LIMITS, guides.dtype)[:, : guides.shape[2]]
+    guides = jnp.where(usable, jnp.clip(guides, lowest, highest), 0)
+    ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(usable, 1.0, 0.0)
+    mask = usable.astype(light.dtype)
+    images = shown(light), shown(noisy), shown(parts["noise"])
+    guides = guides[..., :3], guides[..., 3:4], ao.astype(mask.dtype)
+    return features.Read(*images, *guides, mask), unit
 
 
 @pytree
@@ -43,6 +68,10 @@ class FLNR(AdaptiveFLR):
     params: weights, as from `jflnr.network.weights.load`; those that ship for the `size` if None.
     size: of the network: small or base. with_error: tell the error of what the network corrects.
     """
+
+    # What the network reads.
+    read: ClassVar[Any] = features.Read
+    to_read: ClassVar[Any] = staticmethod(to_read)
 
     params: Any = None
     size: str = field(default="base", metadata={"static": True})
@@ -89,15 +118,17 @@ class FLNR(AdaptiveFLR):
 
         return dataclasses.replace(self, params=shipped(self.name))
 
-    def stages(self) -> tuple[Stage, ...]:
-        side = self.finest
+    def before_network(self) -> tuple[Stage, ...]:
+        """The stages before the one that corrects."""
         *before, fits, _ = AdaptiveFLR.stages(dataclasses.replace(self, keep_energy=False))
+        gives, reach = (("fitted", 0), ("noise", 0)), 2 * self.finest
+        return (*before, fits, Stage(evaluate, gives, fits.names, pixels=True, reach=reach))
+
+    def stages(self) -> tuple[Stage, ...]:
         scales = unet.scales_of(self.ready(5, COLOURS).params)
         gives = (("image", 0), *[("error", 0)] * self.with_error)
         return (
-            *before,
-            fits,
-            Stage(evaluate, (("fitted", 0), ("noise", 0)), fits.names, pixels=True, reach=2 * side),
+            *self.before_network(),
             Stage(
                 correct,
                 (("image", 0),),
@@ -125,9 +156,10 @@ def flnr(target: jax.Array, guides: Guides, method: FLNR = DEFAULT, **options: A
     return flr_adaptive(target, guides, method, **options)
 
 
-def init(key: jax.Array, widths: Sequence[int]) -> unet.Params:
-    """Weights with which FLNR is adaptive FLR. widths: channels of the network, fine to coarse."""
-    return unet.init(key, features.PIXEL, features.POOLED, widths, COLOURS)
+def init(key: jax.Array, widths: Sequence[int], read: Any = features.Read) -> unet.Params:
+    """Weights that correct nothing. widths: channels of the network, fine to coarse. read: what it
+    reads."""
+    return unet.init(key, read.PIXEL, features.POOLED, widths, COLOURS)
 
 
 def evaluate(method: FLNR, parts: Parts, known: Known) -> Parts:
@@ -138,7 +170,7 @@ def evaluate(method: FLNR, parts: Parts, known: Known) -> Parts:
 
 def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
     """The corrected light, `(H, W, C)`, and the brightness before and after."""
-    light, read = parts["fitted"], to_read(parts, known)
+    light, (read, _) = parts["fitted"], to_read(parts, known)
     gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
     image = light * jnp.tile(gain, light.shape[2] // COLOURS)
     return {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
@@ -150,33 +182,11 @@ def restore(method: FLNR, parts: Parts, known: Known) -> Parts:
     return given | ({"error": parts["noise"]} if method.with_error else {})
 
 
-def to_read(parts: Parts, known: Known) -> features.Read:
-    """The images that the network reads, from those of adaptive FLR and its results."""
-    target, guides = parts["target"], jnp.concatenate(layers_of(parts["guides"]), axis=-1)
-    usable = jnp.all(jnp.isfinite(target), axis=-1) & jnp.all(jnp.isfinite(guides), axis=-1)
-    if parts["weight"] is not None:
-        usable &= parts["weight"] > 0
-    usable = usable[..., None]
-    unit = known["mean"] * known["unit"]
-
-    def shown(image: jax.Array) -> jax.Array:
-        return jnp.where(usable, jnp.clip(image / unit, 0, features.BRIGHTEST), 0)
-
-    groups = (*target.shape[:2], target.shape[2] // COLOURS, COLOURS)
-    light, noisy = (x.reshape(groups).sum(2) for x in (parts["fitted"], target))
-    lowest, highest = jnp.asarray(LIMITS, guides.dtype)[:, : guides.shape[2]]
-    guides = jnp.where(usable, jnp.clip(guides, lowest, highest), 0)
-    ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(usable, 1.0, 0.0)
-    mask = usable.astype(light.dtype)
-    images = shown(light), shown(noisy), shown(parts["noise"])
-    return features.Read(*images, guides[..., :3], guides[..., 3:4], ao.astype(mask.dtype), mask)
-
-
-def gains(params: unet.Params, read: features.Read) -> jax.Array:
-    """The factor on the light of every pixel, `(H, W, 3)`."""
-    height, width = read.mask.shape[:2]
+def gains(params: unet.Params, read: Any) -> jax.Array:
+    """The factor on the light of every pixel, `(H, W, 3)`. read: as `features.Read`."""
+    height, width = read.light.shape[:2]
     scales = unet.scales_of(params)
     margins = [(0, -size % (1 << scales)) for size in (height, width)] + [(0, 0)]
     read = jax.tree.map(lambda image: jnp.pad(image, margins), read)
-    out = unet.apply(params, features.of_pixels(read), features.of_means(read, scales))
+    out = unet.apply(params, read.pixels(), features.of_means(read, scales))
     return jnp.exp(LARGEST * jnp.tanh(out[:height, :width] / LARGEST))

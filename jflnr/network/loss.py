@@ -1,5 +1,8 @@
 """What training minimises: errors of the picture as it is displayed."""
 
+import functools
+from collections.abc import Callable
+
 import jax
 import jax.numpy as jnp
 
@@ -7,19 +10,22 @@ from jflnr.metrics import GAMMA
 from jflnr.network import flnr, unet
 from jflnr.network.examples import LEAST_ERROR, Example
 
-# Weight of SMAPE against decibels.
-SMAPE = 5.0
+# Weight of SMAPE against decibels, and beyond white of logarithms against what is shown: what is
+# brighter than white is to keep its light, or other exposures would be wrong.
+SMAPE, BEYOND = 5.0, 0.25
 DARKEST = 1e-3
 
 
 def relative_error(params: unet.Params, example: Example) -> jax.Array:
-    """Squared error of the displayed picture, over that of adaptive FLR on the whole frame.
+    """Squared error of the displayed picture, over that before the network on the whole frame.
 
     So every frame and every count of samples says about as much.
     """
-    light = example.read.light * flnr.gains(params, example.read)
+    light = example.read.corrected(flnr.gains(params, example.read))
     picture = example.albedo * light * example.exposure
-    return _error(picture, example.albedo * example.target) / example.error
+    bright = functools.partial(_shown, beyond=lambda curve: BEYOND * jnp.log(curve))
+    difference = bright(picture) - bright(example.albedo * example.target)
+    return jnp.mean(difference**2) / example.error
 
 
 def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:
@@ -29,16 +35,14 @@ def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:
     picture, target: `(H, W, 3)`, reflected light as exposed.
     """
     smape = jnp.mean(jnp.abs(picture - target) / (jnp.abs(picture) + target + 0.01))
-    return 10 * jnp.log10(_error(picture, target) + LEAST_ERROR) + SMAPE * smape
+    shown = functools.partial(_shown, beyond=lambda curve: 0.02 * (curve - 1))
+    error = jnp.mean((shown(picture) - shown(jnp.minimum(target, 1))) ** 2)
+    return 10 * jnp.log10(error + LEAST_ERROR) + SMAPE * smape
 
 
-def _error(picture: jax.Array, target: jax.Array) -> jax.Array:
-    return jnp.mean((_shown(picture) - _shown(jnp.minimum(target, 1))) ** 2)
-
-
-def _shown(picture: jax.Array) -> jax.Array:
-    """`metrics.display`, with a slope in the dark and a small one beyond white."""
+def _shown(picture: jax.Array, beyond: Callable[[jax.Array], jax.Array]) -> jax.Array:
+    """`metrics.display`, with a slope in the dark. beyond: what the curve adds beyond white."""
     picture = jnp.maximum(picture, 0)
     dark = DARKEST ** (1 / GAMMA) * picture / DARKEST
     curve = jnp.where(picture > DARKEST, jnp.maximum(picture, DARKEST) ** (1 / GAMMA), dark)
-    return jnp.where(curve < 1, curve, 1 + 0.02 * (curve - 1))
+    return jnp.where(curve < 1, curve, 1 + beyond(jnp.maximum(curve, 1)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -21,10 +20,13 @@ from jflnr.network import adam, examples, flnr, loss, unet
 from jflnr.network.adam import Adam
 from jflnr.network.checkpoint import load_state, save_state
 from jflnr.network.examples import Example, before_network, draw
-from jflnr.network.features import Read
 
-# Channels of the network, fine to coarse: of flnr-small and flnr.
-SIZES = {"small": (10, 16, 24, 32), "base": (20, 32, 56, 80)}
+# Channels of the networks, fine to coarse.
+WIDTHS = {
+    "flnr-small": (10, 16, 24, 32),
+    "flnr": (20, 32, 56, 80),
+    "flnr-picture": (20, 32, 56, 80),
+}
 # Samples per pixel that are validated.
 COUNTS = (1, 4, 16)
 # Steps until they have their size; the size of the last ones.
@@ -35,11 +37,12 @@ WARM_UP, LEAST_RATE = 200, 2e-5
 class Settings:
     """What a run is made of.
 
-    batch: crops per step. rate: size of the first steps, which falls with a cosine to nearly
-    nothing. every: steps between validations.
+    method: whose network it is. batch: crops per step. rate: size of the first steps, which falls
+    with a cosine to nearly nothing. every: steps between validations.
     """
 
-    widths: tuple[int, ...] = SIZES["base"]
+    method: Any = flnr.DEFAULT
+    widths: tuple[int, ...] = WIDTHS["flnr"]
     seed: int = 0
     batch: int = 8
     rate: float = 2e-3
@@ -93,9 +96,10 @@ def train(
     """
     if not records:
         raise ValueError("there are no frames to train on")
-    params = flnr.init(jax.random.key(settings.seed), settings.widths)
+    method = settings.method
+    params = flnr.init(jax.random.key(settings.seed), settings.widths, method.read)
     state, best = adam.start(params), params
-    score = functools.partial(validate, list(before_validation(validation)))
+    score = functools.partial(validate, list(before_validation(validation, method)))
     history = [Progress(0, 0.0, float("nan"), score(params))]
     run = {"settings": repr(settings)}
     if state_file is not None and state_file.exists():
@@ -191,28 +195,28 @@ class Batches:
     def _draw(self, step: int) -> Example:
         random = np.random.default_rng([self.settings.seed, step])
         chosen = random.choice(len(self.records), self.settings.batch)
-        drawn = (draw(self.records[i], random) for i in chosen)
+        drawn = (draw(self.settings.method, self.records[i], random) for i in chosen)
         return jax.tree.map(lambda *a: np.stack(a), *drawn)
 
 
 class Shown(NamedTuple):
-    """A frame of validation before the network: `Read`, and its picture's factor and target."""
+    """A frame of validation before the network: what is read, its picture's factor and target."""
 
     spp: int
-    read: Read
+    read: Any
     factor: np.ndarray
     target: np.ndarray
 
 
-def before_validation(paths: Sequence[Path]) -> Iterator[Shown]:
+def before_validation(paths: Sequence[Path], method: Any = flnr.DEFAULT) -> Iterator[Shown]:
     """Frames with a reference, all before the network done once."""
     for path in paths:
-        frame, light = examples.layers(path)
-        albedo = np.asarray(frame.albedo, np.float64)
-        wanted = albedo * np.asarray(frame.reference)
+        noisy = examples.Noisy.of(path, method)
+        albedo = np.asarray(noisy.albedo(), np.float64)
+        wanted = albedo * noisy.target()
         scale = metrics.exposure(wanted)
-        for spp in (spp for spp in COUNTS if spp in light):
-            read, unit = before_network(dataclasses.replace(frame, indirect=light[spp][0]))
+        for spp in (spp for spp in COUNTS if spp in noisy.streams):
+            read, unit = before_network(noisy.frame(spp, noisy.streams[spp][0]), method)
             factor, target = albedo * (unit * scale), metrics.display(wanted, scale)
             yield Shown(spp, read, factor, target)
 
@@ -228,5 +232,5 @@ def validate(frames: Sequence[Shown], params: unet.Params) -> dict[str, float]:
 
 
 @jax.jit
-def _corrected(params: unet.Params, read: Read) -> jax.Array:
-    return read.light * flnr.gains(params, read)
+def _corrected(params: unet.Params, read: Any) -> jax.Array:
+    return read.corrected(flnr.gains(params, read))

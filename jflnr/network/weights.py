@@ -14,6 +14,7 @@ import numpy as np
 
 from jflnr import arrays
 from jflnr.network import features, flnr, unet
+from jflnr.network.features import Read
 
 FORMAT, VERSION = "jflnr network", 3
 # More than any network here has; a file that says it unpacks to more is not read.
@@ -22,28 +23,36 @@ WANTED = "a file of weights that `jflnr train` wrote"
 FOLDER = Path(__file__).parent / "weights"
 
 
-def save(path: str | Path, params: unet.Params, widths: tuple[int, ...], **about: Any) -> None:
-    """Write weights in half precision. about: anything else worth knowing, such as the score."""
+def save(
+    path: str | Path,
+    params: unet.Params,
+    widths: tuple[int, ...],
+    read: Any = Read,
+    **about: Any,
+) -> None:
+    """Write weights in half precision. read: what the network reads, as `features.Read`. about:
+    anything else worth knowing, such as the score."""
     header = {
         "format": FORMAT,
-        "version": VERSION,
         "widths": list(widths),
-        "guides": list(flnr.GUIDES),
-        "features": [features.PIXEL, features.POOLED],
+        **_known(read),
         **about,
     }
     half = {name: np.asarray(value, np.float16) for name, value in params.items()}
     arrays.write(path, header, half, compress=True)
 
 
-def load(path: str | Path) -> tuple[unet.Params, dict[str, Any]]:
-    """Weights in float32, and the header; `ValueError` in one sentence if it is no such file."""
+def load(path: str | Path, read: Any = Read) -> tuple[unet.Params, dict[str, Any]]:
+    """Weights in float32, and the header; `ValueError` in one sentence if it is no such file.
+
+    read: what the network is to read.
+    """
     header, stored = arrays.read(path, WANTED, LARGEST)
-    widths = _widths(path, header)
+    widths = _widths(path, header, read)
     for name, array in stored.items():
         if array.dtype != np.float16 or not np.isfinite(array).all():
             raise ValueError(f"{path}: array {name} must hold finite half-precision numbers")
-    like = jax.eval_shape(lambda key: flnr.init(key, widths), jax.random.key(0))
+    like = jax.eval_shape(lambda key: flnr.init(key, widths, read), jax.random.key(0))
     try:
         return jax.tree.map(jnp.asarray, arrays.restore(stored, like)), header
     except ValueError as error:
@@ -51,18 +60,22 @@ def load(path: str | Path) -> tuple[unet.Params, dict[str, Any]]:
 
 
 @functools.cache
-def shipped(method: str) -> unet.Params:
-    """The weights that come with the package."""
-    return load(FOLDER / f"{method}.npz")[0]
+def shipped(method: str, read: Any = Read) -> unet.Params:
+    """The weights that come with the package. read: as of `load`."""
+    return load(FOLDER / f"{method}.npz", read)[0]
 
 
-def _widths(path: str | Path, header: dict[str, Any]) -> tuple[int, ...]:
+def _known(read: Any) -> dict[str, Any]:
+    """What a header says of what the network reads."""
+    counts = [read.PIXEL, features.POOLED]
+    return {"version": VERSION, "guides": list(read.GUIDES), "features": counts}
+
+
+def _widths(path: str | Path, header: dict[str, Any], read: Any) -> tuple[int, ...]:
     """Those of a header that this version reads."""
     if header.get("format") != FORMAT:
         raise ValueError(f"{path}: not {WANTED}")
-    read = [features.PIXEL, features.POOLED]
-    known = {"version": VERSION, "features": read, "guides": list(flnr.GUIDES)}
-    for name, wanted in known.items():
+    for name, wanted in _known(read).items():
         if header.get(name) != wanted:
             raise ValueError(
                 f"{path}: {name} is {header.get(name)}; this jflnr reads {wanted}, so train anew"

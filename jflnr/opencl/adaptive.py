@@ -56,7 +56,7 @@ def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **opti
 
     target, guides and weight may be arrays of numpy or JAX, or device arrays; context, out and
     on_device: as in `jflnr.opencl.flr`.
-    Returns `(H, W, C)`, float32 unless `out` is given.
+    Returns `(H, W, C)`, float32 unless `out` is given; `with_error` also the error, `(H, W, 1)`.
 
     Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
     """
@@ -64,7 +64,7 @@ def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **opti
 
 
 def run_on_images(
-    write: Callable[[Context, Images, Any, Any], None],
+    write: Callable[[Context, Images, Any, Any, Any | None], None],
     target: Any,
     guides: Any,
     method: Any,
@@ -75,30 +75,37 @@ def run_on_images(
     on_device: bool = False,
     **options: Any,
 ) -> Any:
-    """What `flr_adaptive` returns. write: the result, from images and method, to a device array."""
+    """What `flr_adaptive` returns. write: the result, from images and method, to a device array,
+    and its error to another one or to none."""
     context = default_context() if context is None else context
     method = dataclasses.replace(method, **options)
-    if method.with_error:
-        raise ValueError("the standard error is told on the jax backend only")
     check_regression(target, guides, None, weight)
     check_counts(channel_count(guides), target.shape[2])
     method = method.ready(channel_count(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
     pixels, unit = in_unit(target)
     images = context.array(pixels), to_layers(context, guides), to_weight(context, weight)
-    write(context, images, method, output)
-    if unit != 1:
-        context.scale(output, unit)
-    return context.finish(output, result)
+    error = told = None
+    if method.with_error:
+        error, told = to_output(context, (*target.shape[:2], 1), None, on_device)
+    write(context, images, method, output, error)
+    for array in (output, error):
+        if unit != 1 and array is not None:
+            context.scale(array, unit)
+    image = context.finish(output, result)
+    return image if error is None else (image, context.finish(error, told))
 
 
-def write(context: Context, images: Images, method: AdaptiveFLR, output: Any) -> None:
-    """Write the light, `(H, W, C)`, with the brightness of the input if that is to be kept."""
+def write(
+    context: Context, images: Images, method: AdaptiveFLR, output: Any, error: Any | None
+) -> None:
+    """Write the light, `(H, W, C)`, with the brightness of the input if that is to be kept, and, if
+    that is not None, its error."""
     target, _, weight = images
     image = context.empty(target.shape) if method.keep_energy else output
-    write_light(context, *images, method, image)
+    write_light(context, *images, method, image, error)
     if method.keep_energy:
-        rescale(context, image, target, weight, output)
+        rescale(context, image, target, weight, output, error=error)
 
 
 def in_unit(target: Any) -> tuple[Any, np.float32]:

@@ -22,14 +22,16 @@ def check_counts(guides: int, channels: int) -> None:
 
 
 def numbers_of(method: Any) -> Any:
-    """The method with its numbers as those of Python; fields without one stay."""
+    """The method with its numbers as those of Python; other fields stay."""
     fields = ((field, getattr(method, field.name)) for field in dataclasses.fields(method))
     return dataclasses.replace(
         method,
         **{
             field.name: float(value)
             for field, value in fields
-            if value is not None and not field.metadata.get("static")
+            if value is not None
+            and not isinstance(value, dict)
+            and not field.metadata.get("static")
         },
     )
 

@@ -39,11 +39,17 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
 
 
 def rescale(
-    context: Context, image: Any, target: Any, weight: Any | None, output: Any, slack: float = 0.0
+    context: Context,
+    image: Any,
+    target: Any,
+    weight: Any | None,
+    output: Any,
+    slack: float = 0.0,
+    error: Any | None = None,
 ) -> None:
     """Scale the result so that its brightness sums to the input's over the pixels that count.
 
-    slack: share by which it may differ.
+    slack: share by which it may differ. error: `(H, W, 1)` float32, is scaled likewise.
 
     image: `(H, W, C)` float32. target: `(H, W, C)`. weight: `(H, W)` or None. output: `(H, W, C)`,
     float32 or float16, is written; it may be `image`.
@@ -52,10 +58,12 @@ def rescale(
     partial, ratio = context.empty((height, 2)), context.empty((1,))
     defines = pixel_defines(target, (), weight, 1) | brightness_defines(channels)
     defines["WIDTH"] = context.width()
-    if output.dtype == "float16":
-        defines["HALF_OUTPUT"] = 1
     arguments = (width, height, target, image, weight, partial)
     context.run("energy_rows", "rescale.cl", defines, (height,), arguments)
     context.run("energy_ratio", "rescale.cl", defines, (1,), (height, slack, partial, ratio))
-    strips = -(-image.size // defines["WIDTH"])
-    context.run("rescale", "rescale.cl", defines, (strips,), (image.size, ratio, image, output))
+    scaled = [(image, output), *([] if error is None else [(error, error)])]
+    for before, after in scaled:
+        strips = -(-before.size // defines["WIDTH"])
+        half = {"HALF_OUTPUT": 1} if after.dtype == "float16" else {}
+        arguments = before.size, ratio, before, after
+        context.run("rescale", "rescale.cl", defines | half, (strips,), arguments)

@@ -5,8 +5,9 @@ from typing import Any
 
 from jflnr.checks import one_sentence
 from jflnr.network.flnr import DEFAULT, FLNR
+from jflnr.network.picture import PictureFLNR
 from jflnr.opencl import network
-from jflnr.opencl.adaptive import Images, run_on_images, write_light
+from jflnr.opencl.adaptive import Images, flr_adaptive, run_on_images, write_light
 from jflnr.opencl.context import Context
 from jflnr.opencl.energy import rescale
 
@@ -17,12 +18,18 @@ def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> An
     return run_on_images(write, target, guides, method, **options)
 
 
-def write(context: Context, images: Images, method: FLNR, output: Any) -> None:
-    """Write the corrected light, `(H, W, C)`, with about the brightness of the input."""
+def write(context: Context, images: Images, method: FLNR, output: Any, error: Any) -> None:
+    """Write the corrected light, `(H, W, C)`, with about the brightness of the input, and, if that
+    is not None, its error."""
     target, _, weight = images
-    light, error = context.empty(target.shape), context.empty((*target.shape[:2], 1))
-    run = write_light(context, *images, dataclasses.replace(method, params=None), light, error)
-    image = context.empty(target.shape)
-    network.correct(context, method.params, *images, light, error, run.mean, image)
+    light, image = context.empty(target.shape), context.empty(target.shape)
+    noise = context.empty((*target.shape[:2], 1)) if error is None else error
+    run = write_light(context, *images, method, light, noise)
+    network.correct(context, method.params, *images, light, noise, run.mean, image)
     slack = 0.0 if method.keep_energy else float(method.slack)
     rescale(context, image, target, weight, output, slack)
+
+
+def picture_light(target: Any, guides: Any, method: PictureFLNR, **options: Any) -> tuple[Any, Any]:
+    """The light of a picture before the network, and its error; all else as of `flr_adaptive`."""
+    return flr_adaptive(target, guides, dataclasses.replace(method, with_error=True), **options)

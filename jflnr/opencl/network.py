@@ -1,13 +1,14 @@
 """What the network reads, its layers, and what it does: host side of kernels_cl/network.
 
-The twins in JAX are jflnr/network/features.py, unet.py and flnr.py.
+The twins in JAX are jflnr/network/features.py, unet.py, flnr.py and picture.py.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jflnr.network import features, unet
+from jflnr.network import features, picture, unet
 from jflnr.network.flnr import LARGEST
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP as MARGIN
@@ -64,27 +65,57 @@ def correct(
     target, guides, weight: as adaptive FLR took them. error: `(H, W, 1)`, of `light`. mean: of the
     frame's brightness.
     """
+    size = light.shape[:2]
+    defines = pixel_defines(target, guides, weight, 1) | {"BRIGHTEST": f"{features.BRIGHTEST}f"}
+    images = target, *guide_arguments(guides), weight, light, error, mean
+    x, said = _said(context, params, size, features.Read.PIXEL, defines, images)
+    defines = {"COUNTS": x.channels, "PIXEL": features.Read.PIXEL, "MASK": MASK}
+    _write(context, said, (x.values,), light, output, defines)
+
+
+def correct_picture(context: Context, params: unet.Params, read: picture.Read) -> np.ndarray:
+    """The corrected picture, `(H, W, 3)`, of and to arrays of numpy."""
+    images = [context.array(np.require(image, np.float32, ["C", "ALIGNED"])) for image in read]
+    named = dict(zip(read._fields, images, strict=True))
+    size, defines = read.light.shape[:2], guide_defines((), 3) | {"PICTURE": 1}
+    _, said = _said(context, params, size, picture.Read.PIXEL, defines, images)
+    result = np.empty(read.light.shape, np.float32)
+    output = context.array(result, writable=True) if context.on_cpu else context.empty(result.shape)
+    others = named["own"], named["alpha"]
+    _write(context, said, others, named["light"], output, {"PICTURE": 1} | DARK)
+    return context.finish(output, result)
+
+
+def _said(
+    context: Context,
+    params: unet.Params,
+    size: tuple[int, int],
+    pixel: int,
+    defines: dict[str, Any],
+    images: Sequence[Any],
+) -> tuple[Maps, Maps]:
+    """What the network reads, and what it says. size: of the image. pixel: values of each pixel."""
     arrays = {name: np.asarray(value, np.float32) for name, value in params.items()}
-    scales = unet.scales_of(params)
-    height, width, channels = light.shape
-    h, w = (-(-size >> scales) << scales - 1 for size in (height, width))
-    x = new_maps(context, 4 * features.PIXEL + features.POOLED, h, w)
+    scales, (height, width) = unet.scales_of(params), size
+    h, w = (-(-length >> scales) << scales - 1 for length in size)
+    x = new_maps(context, 4 * pixel + features.POOLED, h, w)
     means = new_maps(context, MEANS, h, w)
-    defines: dict[str, Any] = pixel_defines(target, guides, weight, 1) | DARK
-    defines |= {"WIDTH": context.width(), "BRIGHTEST": f"{features.BRIGHTEST}f"}
-    arguments = (
-        width, height, h, w, x.pitch, target, *guide_arguments(guides), weight, light, error, mean,
-        x.values, means.values,
-    )  # fmt: skip
-    size, file = ((x.pitch - MARGIN) // context.width(), h), "network/features.cl"
-    context.run("features", file, defines, size, arguments, alone=True)
-    said = apply(context, arrays, x, means)
-    defines = guide_defines((), channels) | {
-        "WIDTH": context.width(), "LARGEST": f"{LARGEST}f", "COUNTS": x.channels,
-        "PIXEL": features.PIXEL, "MASK": MASK,
-    }  # fmt: skip
-    of_light = width, height, h, w, x.pitch, said.values, x.values, light, output
-    context.run("correct", "network/correct.cl", defines, size, of_light)
+    defines = defines | DARK | {"WIDTH": context.width()}
+    arguments = width, height, h, w, x.pitch, *images, x.values, means.values
+    over, file = ((x.pitch - MARGIN) // context.width(), h), "network/features.cl"
+    context.run("features", file, defines, over, arguments, alone=True)
+    return x, apply(context, arrays, x, means)
+
+
+def _write(
+    context: Context, said: Maps, others: tuple, light: Any, output: Any, defines: dict[str, Any]
+) -> None:
+    """Write the light times what the network says. others: as kernels_cl/network/correct.cl."""
+    height, width, channels = light.shape
+    defines |= guide_defines((), channels) | {"WIDTH": context.width(), "LARGEST": f"{LARGEST}f"}
+    size = (said.pitch - MARGIN) // context.width(), said.h
+    arguments = width, height, said.h, said.w, said.pitch, said.values, *others, light, output
+    context.run("correct", "network/correct.cl", defines, size, arguments)
 
 
 def apply(context: Context, arrays: dict[str, Any], x: Maps, means: Maps) -> Maps:

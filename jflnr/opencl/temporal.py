@@ -70,14 +70,16 @@ def step(
     light, weight = accumulate(context, light, change, sample, covered, least[0])
     images = {"target": light.mean, "guides": layers, "weight": weight}
     fitted = twins.regress(method, images, context, composed=False, on_device=True)
-    image, _ = accumulate(context, image, change, fitted, covered, least[1])
+    image, _ = accumulate(context, image, change, fitted["image"], covered, least[1])
     result: Any = image.mean
     averaged: Any = light.mean
     context.finish(result, result)
     state = State(surface, light, image, evidence)
-    averages = {"target": averaged.get(), "image": result.get()}
-    if (picture := compose(method, given | averages, {"average": filters.average})) is not None:
-        return state, context.array(np.asarray(picture)) if on_device else np.asarray(picture)
+    averages = {"target": averaged.get(), "weight": weight.get(), "image": result.get()}
+    averages |= {"error": fitted["error"].get()} if "error" in fitted else {}
+    if "image" in (shown := compose(method, given | averages, twins.known_on(context))):
+        picture = np.asarray(shown["image"])
+        return state, context.array(picture) if on_device else picture
     return state, result if on_device else result.get()
 
 

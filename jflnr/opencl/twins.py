@@ -4,16 +4,15 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from jflnr.images.noisy_guides import Filters
 from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
 from jflnr.opencl.edges import average
-from jflnr.opencl.flnr import flnr
+from jflnr.opencl.flnr import flnr, picture_light
 from jflnr.opencl.flr import flr
+from jflnr.opencl.network import correct_picture
 from jflnr.opencl.noisy_guides import smooth_guide
-from jflnr.stages import Parts, compose
+from jflnr.stages import Known, Parts, compose
 
 # By the method's type.
 REGRESSIONS: dict[str, Callable[..., Any]] = {
@@ -21,6 +20,7 @@ REGRESSIONS: dict[str, Callable[..., Any]] = {
     "AdaptiveFLR": flr_adaptive,
     "FLNR": flnr,
     "WholePicture": flr_adaptive,
+    "PictureFLNR": picture_light,
 }
 
 
@@ -30,6 +30,12 @@ def filters_on(context: Context) -> Filters:
     return Filters(*here)
 
 
+def known_on(context: Context) -> Known:
+    """What the composing stages of a method take to be done on the device."""
+    correct = functools.partial(correct_picture, context)
+    return {"average": filters_on(context).average, "corrected": correct}
+
+
 def regress(
     method: Any,
     images: Parts,
@@ -37,21 +43,14 @@ def regress(
     composed: bool = True,
     out: Any | None = None,
     **options: Any,
-) -> Any:
-    """`jflnr.stages.regress` on the device.
-
-    options: as of `flr`. Returns `(H, W, C)`.
-    """
+) -> Parts:
+    """`jflnr.stages.regress` on the device. out: where `image` is to be. options: as of `flr`."""
     others = ("guides_map", "weight")
     given = {name: images[name] for name in others if images.get(name) is not None} | options
     later = composed and any(stage.composes for stage in method.stages())
     run = REGRESSIONS[type(method).__name__]
     given |= {"context": context, "out": None if later else out}
-    light = run(images["target"], images["guides"], method, **given)
-    if not later:
-        return light
-    picture = compose(method, images | {"image": light}, {"average": filters_on(context).average})
-    if out is None:
-        return picture
-    np.copyto(out, np.asarray(picture), casting="same_kind")
-    return out
+    found = run(images["target"], images["guides"], method, **given)
+    found = found if isinstance(found, tuple) else (found,)
+    parts = dict(zip(("image", "error"), found, strict=False))
+    return compose(method, images | parts, known_on(context)) if later else parts

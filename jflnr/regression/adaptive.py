@@ -123,7 +123,7 @@ class AdaptiveFLR:
         )
         models = Stage(
             fit_models,
-            (("models", side), ("output", 2 * side), *[("error", side)] * self.tells_error),
+            (("models", side), ("output", 2 * side), *[("block_error", side)] * self.tells_error),
             ("moments", "light"),
             reach=reach_of(self.levels) * side,
             align=side << (self.levels - 1),
@@ -234,7 +234,7 @@ def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
         "output": output,
         "kept": jnp.stack([light[0] * output, light[0] * output**2]),
     }
-    return given | ({"error": block_error(*levels)} if method.tells_error else {})
+    return given | ({"block_error": block_error(*levels)} if method.tells_error else {})
 
 
 def learn_rate(method: Any, known: Known, sums: Parts) -> Known:
@@ -254,7 +254,7 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     if method.tells_error:
         own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
         # The bound is there for its root's derivative, and for pixels that see no light.
-        error = jnp.sqrt(parts["error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
+        error = jnp.sqrt(parts["block_error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
         none = jnp.zeros((*parts["target"].shape[:2], 0), error.dtype)
         given["error"] = apply(error[None, None], none, shift[:0], method.finest) * unit
     return given

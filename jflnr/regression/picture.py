@@ -224,10 +224,21 @@ def denoise_picture(
 
 @QUIETLY
 def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
+    """What `finished` says, of the light that the fit gave."""
+    picture = composed(parts, known.get("average", average))
+    if method.with_error:
+        parts = parts | {"error": parts["error"] * light_of(parts["surface"])[..., None]}
+    return finished(method, picture, parts)
+
+
+def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
     """The picture, `(H, W, 3)`, or with its alpha `(H, W, 4)`; its error; and its light passes, as
     in `Frame.lobes`, their colours, and what is emitted and seen of the environment, as planes of
-    `(H, W, C)`."""
-    image, alpha = composed(parts, known.get("average", average)), parts["alpha"]
+    `(H, W, C)`.
+
+    image: `(H, W, 3)`. parts: with `error`, of the picture, if the method tells it.
+    """
+    alpha = parts["alpha"]
     xp: Any = image.__array_namespace__()
     given = {"image": image if alpha is None else xp.concatenate([image, alpha], axis=-1)}
     if method.lobes:
@@ -238,7 +249,7 @@ def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
         planes = [passes, parts["colours"][1], emitted + left, environment]
         given["passes"] = xp.concatenate(planes, axis=-1)
     if method.with_error:
-        given["error"] = parts["error"] * light_of(parts["surface"])[..., None]
+        given["error"] = parts["error"]
     return given
 
 

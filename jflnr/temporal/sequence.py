@@ -138,9 +138,10 @@ def _step(
     # A pixel counts as much as the frames that it has been seen in.
     weight = light.samples[..., 0] * (1 if weight is None else weight)
     images |= {"target": light.mean, "weight": weight}
-    fitted = regress(method, images, composed=False)["image"]
-    image = accumulate(_changed(image, change), fitted, temporal.image)
-    return light, image, evidence, compose(method, images | {"image": image.mean})
+    fitted = regress(method, images, composed=False)
+    image = accumulate(_changed(image, change), fitted["image"], temporal.image)
+    shown = compose(method, images | fitted | {"image": image.mean})
+    return light, image, evidence, shown.get("image")
 
 
 def _changed(average: Average, change: Change) -> Average:

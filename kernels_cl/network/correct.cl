@@ -1,8 +1,8 @@
-// The light times the factors that the network gives (jflnr/network/flnr.py).
+// The light times the factors that the network gives (jflnr/network/flnr.py, picture.py).
 //
-// Defines beside those of the headers, with Q = 0: LARGEST, the logarithm of the largest factor; COUNTS,
-// the channels of the map of what was read, and PIXEL of them for each pixel, whose number MASK is 1
-// where it counts.
+// Defines beside those of the headers, with Q = 0: LARGEST, the logarithm of the largest factor. For
+// light COUNTS, the channels of the map of what was read, and PIXEL of them for each pixel, whose
+// number MASK is 1 where it counts; for whole pictures PICTURE, and DARK, as in features.cl.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -29,26 +29,38 @@ INLINE real factor(real said)
     return exp_below_0(exponent - LARGEST) * exp(LARGEST);
 }
 
+#ifdef PICTURE
+#define OTHERS global const float *own, global const float *alpha
+#else
+#define OTHERS global const float *read
+#endif
+
 // said: a map of 12 channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as wide.
-// light, output: (H, W, C) in float. Global size ((pitch - MARGIN) / WIDTH, h).
+// light, own, output: (H, W, C) in float, alpha: (H, W). Global size ((pitch - MARGIN) / WIDTH, h).
 kernel void correct(
-    int width, int height, int h, int w, int pitch, global const float *said,
-    global const float *read, global const float *light, global float *output)
+    int width, int height, int h, int w, int pitch, global const float *said, OTHERS,
+    global const float *light, global float *output)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= w || y >= h || 2 * y >= height) return;
     said += MAP_AT(x, y, pitch, 12, 0);
+#ifndef PICTURE
     read += MAP_AT(x, y, pitch, COUNTS, MASK);
+#endif
     for (int dy = 0; dy < 2 && 2 * y + dy < height; ++dy) {
         real even[3], odd[3];
+#ifndef PICTURE
         const real even_counts = READ(read + (long)(2 * dy) * PIXEL * pitch);
         const real odd_counts = READ(read + (long)(2 * dy + 1) * PIXEL * pitch);
+#endif
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
             even[c] = factor(READ(said + (long)(6 * dy + c) * pitch));
             odd[c] = factor(READ(said + (long)(6 * dy + 3 + c) * pitch));
+#ifndef PICTURE
             even[c] = even_counts > 0 ? even[c] : (real)1;
             odd[c] = odd_counts > 0 ? odd[c] : (real)1;
+#endif
         }
         for (int part = 0; part < 2; ++part) {
             const int x0 = 2 * x + part * WIDTH, last = MIN(width - x0, WIDTH) - 1;
@@ -59,7 +71,15 @@ kernel void correct(
             for (int c = 0; c < C; ++c) {
                 const real gain = part == 0 ? FIRST_OF(even[c % 3], odd[c % 3])
                                             : SECOND_OF(even[c % 3], odd[c % 3]);
-                values[c] = gain * guide_lanes(light + pixel * C, C, c, 0, last);
+                const real before = guide_lanes(light + pixel * C, C, c, 0, last);
+#ifdef PICTURE
+                const real cover = guide_lanes(alpha + pixel, 1, 0, 0, last), dark = DARK * cover;
+                const real least = guide_lanes(own + pixel * C, C, c, 0, last);
+                const real part = 1 + cover * cover * (gain - 1);
+                values[c] = MAX((before + dark) * part - dark, least);
+#else
+                values[c] = gain * before;
+#endif
             }
             if (last == WIDTH - 1)
                 write_pixels(output + pixel * C, values, 0, WIDTH - 1);

@@ -1,94 +1,29 @@
 // What the network reads of every pixel and of the means over 2 x 2 of them, in maps at half of the
 // resolution: 2 x 2 pixels side by side as channels (jflnr/network/features.py, unet.pack).
 //
-// Defines beside those of the headers: DARK; BRIGHTEST, above which no light is seen.
+// Defines beside those of the headers: DARK; PICTURE where whole pictures are read.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "images.h"
-#include "products.h"
 #include "grids.h"
 #include "network/maps.h"
 #include "network/read.h"
-
-#define PIXEL 15
-
-#define OF_IMAGE(i) p[MIN(i, last) * stride + channel]
-INLINE real image_lanes(global const float *p, int stride, int channel, int last)
-{
-    return LANES(real, OF_IMAGE);
-}
-
-// The PIXEL values of WIDTH pixels from (x, y) on, and what is averaged of them; zeros beyond the image
-// and where a pixel does not count.
-INLINE void of_pixels(
-    int x, int y, int width, int height, float unit, global const target_t *target,
-    GUIDE_PARAMETERS, global const weight_t *weight, global const float *light,
-    global const float *error, real *values, real *means)
-{
-    const long pixel = (long)y * width + x;
-    const int last = MIN(width - x, WIDTH) - 1;
-    real denoised[3] = {0, 0, 0}, noisy[3] = {0, 0, 0}, guides[5] = {0, 0, 0, 0, 0}, wrong = 0;
-    mask counts = 0;
-    if (y < height && last >= 0) {
-        real all[C], known[Q];
-#pragma unroll
-        for (int c = 0; c < C; ++c) {
-            all[c] = target_lanes(target + pixel * C, C, c, 0, last);
-            noisy[c % 3] += all[c];
-            denoised[c % 3] += image_lanes(light + pixel * C, C, c, last);
-        }
-#pragma unroll
-        for (int q = 0; q < Q; ++q) known[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, last);
-        counts = usable(weight, pixel, last, known, all) > 0;
-#pragma unroll
-        for (int q = 0; q < Q; ++q) {
-            const real cut = CLAMP(known[q], q < 3 ? -1 : 0, q == 3 ? 100 : 1);
-            guides[q] = counts ? cut : (real)0;
-        }
-        wrong = image_lanes(error + pixel, 1, 0, last);
-    }
-#if Q == 4
-    guides[4] = counts ? (real)1 : (real)0;
+#ifdef PICTURE
+#include "network/picture.h"
+#else
+#include "network/light.h"
 #endif
-#define SHOWN(v) (counts ? CLAMP((v) * unit, 0, BRIGHTEST) : (real)0)
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-        means[c] = denoised[c] = SHOWN(denoised[c]);
-        means[3 + c] = noisy[c] = SHOWN(noisy[c]);
-    }
-    wrong = SHOWN(wrong);
-    const real before = luminance(denoised), after = luminance(noisy), bright = before + 0.05f;
-    means[6] = MIN(after, 4 * before + 0.1f);
-    means[7] = (after - before) * (after - before);
 
-    values[0] = log_above_0(before + DARK);
-    values[1] = 0.5f * CLAMP((after - before) / bright, -1, 4);
-    values[2] = log_above_0(1 + (after + 0.05f) / bright);
-    values[3] = log_above_0(wrong / bright + 0.01f) + 1.5f;
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-        values[4 + c] = log_above_0((denoised[c] + DARK) / (before + DARK));
-        values[7 + c] = guides[c];
-    }
-    values[10] = log_above_0(guides[3] + 0.05f);
-    values[11] = 2 * guides[4] - 1;
-    values[12] = MIN(wrong, 3);
-    values[13] = counts ? (real)1 : (real)0;
-    values[14] = log_above_0(after + 0.03f);
-}
-
-// light, error: (H, W, C) and (H, W) in float. mean: of the frame. map: 4 PIXEL + POOLED channels.
-// means: a map of MEANS channels. Both have h x w blocks of 2 x 2 pixels.
+// map: 4 PIXEL + POOLED channels. means: a map of MEANS channels. Both have h x w blocks of 2 x 2
+// pixels.
 // Global size ((pitch - MARGIN) / WIDTH, h).
 kernel void features(
-    int width, int height, int h, int w, int pitch, global const target_t *target,
-    GUIDE_PARAMETERS, global const weight_t *weight, global const float *light,
-    global const float *error, global const float *mean, global float *map, global float *means)
+    int width, int height, int h, int w, int pitch, IMAGE_PARAMETERS, global float *map,
+    global float *means)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= w || y >= h) return;
-    const float unit = 1 / mean[0];
     real sums[MEANS];
 #pragma unroll
     for (int k = 0; k < MEANS; ++k) sums[k] = 0;
@@ -98,8 +33,8 @@ kernel void features(
 #pragma unroll
         for (int half_of = 0; half_of < 2; ++half_of)
             of_pixels(
-                2 * x + half_of * WIDTH, 2 * y + dy, width, height, unit, target, GUIDE_IMAGES,
-                weight, light, error, values[half_of], taken[half_of]);
+                2 * x + half_of * WIDTH, 2 * y + dy, width, height, IMAGES, values[half_of],
+                taken[half_of]);
         global float *to = map + (long)dy * 2 * PIXEL * pitch;
 #pragma unroll
         for (int k = 0; k < PIXEL; ++k) {

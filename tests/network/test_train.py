@@ -12,7 +12,7 @@ import pytest
 
 from jflnr import exr
 from jflnr.cli import main
-from jflnr.network import adam, examples, train, weights
+from jflnr.network import adam, examples, flnr, train, weights
 
 
 def test_adam_is_the_papers_algorithm():
@@ -69,7 +69,7 @@ def test_crops_are_the_record_mirrored_and_recoloured(records):
     record = records[0]
     seen = set()
     for seed in range(8):
-        example = examples.draw(record, np.random.default_rng(seed))
+        example = examples.draw(flnr.DEFAULT, record, np.random.default_rng(seed))
         read = example.read
         assert read.light.shape == (32, 32, 3) and read.mask.all()
         np.testing.assert_allclose(np.linalg.norm(read.normal, axis=-1), 1, rtol=2e-3)
@@ -142,7 +142,7 @@ def test_command(frames, tmp_path, capsys):
     """It writes weights that say where they come from, keeps them, and goes on."""
     out = tmp_path / "w.npz"
     command = ["train", "--data", str(tmp_path), "--val", str(frames[0]), "-o", str(out)]
-    command += ["--size", "small", "--batch", "2", "--every", "1"]
+    command += ["--method", "flnr-small", "--batch", "2", "--every", "1"]
     assert main([*command, "--steps", "1"]) == 0
     assert "dB at 1 spp" in capsys.readouterr().out
     _, header = weights.load(out)

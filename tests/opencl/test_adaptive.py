@@ -94,6 +94,16 @@ def test_energy_is_kept(context: Context) -> None:
     assert np.ptp(found / plain) < 1e-5  # one factor for the whole frame
 
 
+@pytest.mark.parametrize("keep_energy", [False, True])
+def test_the_error_is_told(context: Context, keep_energy: bool) -> None:
+    target, guides = scene(40, 70, 3, 3)
+    options = {"with_error": True, "keep_energy": keep_energy}
+    right = jax.jit(functools.partial(jax_adaptive, **options))(target, guides)
+    found = flr_adaptive(target, guides, context=context, **options)
+    for one, other in zip(found, right, strict=True):
+        assert error(one, np.asarray(other)) < tolerances.ADAPTIVE
+
+
 def test_light_groups_sum_to_the_sum(context: Context) -> None:
     target, guides = scene(*SIZE, 5, 6)
     groups = flr_adaptive(target, guides, PARAMETERS, context=context)

@@ -13,13 +13,14 @@ import numpy as np
 
 from experiments.peers import oidn
 from jflnr import exr
-from jflnr.frame import HALF_MAX, read_frame
+from jflnr.frame import HALF_MAX, Frame, read_frame
 from jflnr.metrics import exposure
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Denoise the reference of every frame in `--folder`/train into a layer `target`."""
-    paths = sorted((arguments.folder / "train").glob("*.exr"))
+    """Denoise the reference of every frame in `--folder` into a layer `target`."""
+    folders = [arguments.folder / split for split in ("train", "val")]
+    paths = sorted(path for folder in folders for path in folder.glob("*.exr"))
     made = sum(add_target(path) for path in paths)
     print(f"{len(paths)} frames have a layer target, {made} of them new")
 
@@ -29,15 +30,28 @@ def add_target(path: Path) -> bool:
     channels = exr.read_channels(path)
     if "target.R" in channels:
         return False
-    frame = read_frame(path)
+    target = of_picture(channels) if "beauty_1.R" in channels else of_light(read_frame(path))
+    target = np.clip(target, 0, HALF_MAX).astype(np.float16)
+    layer = {f"target.{c}": target[..., i] for i, c in enumerate("RGB")}
+    exr.write_channels(path, channels | layer, exr.read_attributes(path).comments)
+    return True
+
+
+def of_light(frame: Frame) -> np.ndarray:
+    """The reference of a frame of indirect light, denoised, `(H, W, 3)`."""
     assert frame.reference is not None
     # OIDN sees pictures as they are shown.
     scale = exposure(np.asarray(frame.albedo) * frame.reference)
     light = dataclasses.replace(frame, indirect=np.asarray(frame.reference, np.float32) * scale)
-    target = np.maximum(oidn.denoise(light, clean=True), 0) / scale
-    if frame.mask is not None:
-        target = target * (frame.mask > 0)
-    target = np.minimum(target, HALF_MAX).astype(np.float16)
-    layer = {f"target.{c}": target[..., i] for i, c in enumerate("RGB")}
-    exr.write_channels(path, channels | layer, exr.read_attributes(path).comments)
-    return True
+    target = oidn.denoise(light, clean=True) / scale
+    return target if frame.mask is None else target * (frame.mask > 0)
+
+
+def of_picture(channels: dict[str, np.ndarray]) -> np.ndarray:
+    """The reference of a whole picture, denoised with the layers of as many samples."""
+    wanted = {"reference": "RGB", "seen_albedo": "RGB", "seen_normal": "XYZ"}
+    picture, albedo, normal = (
+        np.stack([channels[f"{name}.{c}"] for c in parts], axis=-1).astype(np.float32)
+        for name, parts in wanted.items()
+    )
+    return oidn.prefiltered(picture, albedo=np.clip(albedo, 0, 1), normal=normal)

@@ -1,0 +1,230 @@
+"""FLNR of whole pictures: the regression of all materials, and a network that corrects its picture.
+
+The network is that of `flnr.py`; it reads the denoised and the noisy picture, what is known of the
+surfaces, and what was taken from their albedo and normals as noise.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+from jflnr.frame import Frame
+from jflnr.images.guides import Scene, scene_of
+from jflnr.images.noisy_guides import FILTERS, Filters
+from jflnr.lazy import jax, jit, jnp, pytree
+from jflnr.network import unet
+from jflnr.network.features import BRIGHTEST, DARK, luminance
+from jflnr.network.flnr import COLOURS, DEEPEST, gains
+from jflnr.regression.adaptive import light_of
+from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
+from jflnr.regression.detail import REACH
+from jflnr.regression.features import SAMPLES, average
+from jflnr.regression.picture import (
+    EVERYTHING,
+    GUIDES,
+    QUIETLY,
+    WholePicture,
+    composed,
+    finished,
+    picture_in,
+)
+from jflnr.stages import Known, Parts, Stage
+
+
+class Read(NamedTuple):
+    """The images that are read, `(H, W, 3)` or `(H, W, 1)`.
+
+    light, noisy: the denoised picture and that before it, over the frame's mean brightness. error:
+    standard error of its brightness. own: of the picture, what no surface reflects. albedo, normal,
+    seen_normal, depth, alpha: without noise; albedo_left, normal_left: what of them was noise, the
+    latter the length of the difference. weight: less than 1 for fireflies. samples: that a pixel is
+    a mean of.
+    """
+
+    # As of `features.Read`.
+    PIXEL = 27
+    GUIDES = WholePicture.guides
+    LAYER, COVER = "beauty", "alpha"
+    OF_NOISE = (
+        *("light", "noisy", "error", "own", "albedo", "albedo_left", "normal", "normal_left"),
+        *("seen_normal", "depth", "alpha", "weight", "samples"),
+    )
+    LIGHT = ("light", "noisy", "own")
+    COLOURS = (*LIGHT, "albedo", "albedo_left")
+    DIRECTIONS = ("normal", "seen_normal")
+
+    light: Any
+    noisy: Any
+    error: Any
+    own: Any
+    albedo: Any
+    albedo_left: Any
+    normal: Any
+    normal_left: Any
+    seen_normal: Any
+    depth: Any
+    alpha: Any
+    weight: Any
+    samples: Any
+
+    def pixels(self) -> jax.Array:
+        """What is read of every pixel, `(H, W, 27)`."""
+        light, noisy = luminance(self.light), luminance(self.noisy)
+        planes = [
+            jnp.log(self.light + DARK),
+            jnp.clip((self.noisy - self.light) / (light + 0.05), -1, 4) / 2,
+            jnp.log1p((noisy + 0.05) / (light + 0.05)),
+            jnp.log(self.error / (light + 0.05) + 0.01) + 1.5,
+            jnp.minimum(self.error, 3),
+            2 * jnp.sqrt(self.albedo + 1e-4) - 1,
+            2 * self.albedo_left,
+            self.normal,
+            self.normal_left,
+            self.seen_normal,
+            jnp.log(self.depth + 0.05),
+            2 * self.alpha - 1,
+            jnp.minimum(luminance(self.own) / (light + DARK), 1),
+            self.weight,
+            jnp.log2(jnp.maximum(self.samples, 1)) / 4,
+        ]
+        return jnp.concatenate(planes, axis=-1)
+
+    def corrected(self, gains: jax.Array) -> jax.Array:
+        """The picture by what the network says of it, `(H, W, 3)` both.
+
+        What is dark may brighten where something covers it; all is as bright as its `own` light.
+        The less covers a pixel, the less is changed.
+        """
+        dark, gains = DARK * self.alpha, 1 + self.alpha**2 * (gains - 1)
+        return jnp.maximum((self.light + dark) * gains - dark, self.own)
+
+
+def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
+    """The images that the network reads, from those of `picture` and its results, and the unit of
+    their light.
+
+    Over time a pixel weighs as much as the frames that it is a mean of.
+    """
+    xp: Any = parts["fitted"].__array_namespace__()
+    unit = parts["brightness"]
+    over = xp.where(unit > 0, unit, 1)
+
+    def shown(image: Any) -> Any:
+        return xp.clip(xp.nan_to_num(image / over), 0, BRIGHTEST)
+
+    noisy = parts["target"] * parts["surface"] + parts["own"]
+    light = [shown(image) for image in (parts["fitted"], noisy, parts["noise"], parts["own"])]
+    weight = parts["weight"][..., None]
+    alpha = xp.ones_like(weight) if parts["alpha"] is None else xp.clip(parts["alpha"], 0, 1)
+    others = {"alpha": alpha, "weight": xp.minimum(weight, 1)}
+    others["samples"] = parts["surfaces"]["samples"] * xp.maximum(weight, 1)
+    return Read(*light, **parts["surfaces"] | others), unit
+
+
+@pytree
+@dataclass(frozen=True)
+class PictureFLNR(WholePicture):
+    """The method: `picture`, corrected by a network (docs/flnr.md).
+
+    params: weights, as from `jflnr.network.weights.load`; those that ship if None. The rest is of
+    `WholePicture`; the error is that of what the network corrects.
+    """
+
+    name: ClassVar[str] = "flnr-picture"
+    read: ClassVar[Any] = Read
+    to_read: ClassVar[Any] = staticmethod(to_read)
+
+    params: Any = None
+
+    @property
+    def tells_error(self) -> bool:
+        """The network reads it."""
+        return True
+
+    def for_frame(self, frame: Frame, names: tuple[str, ...]) -> PictureFLNR:
+        method = super().for_frame(frame, names)
+        return method.ready(len(self.guides), COLOURS)
+
+    def ready(self, guides: int, channels: int) -> PictureFLNR:
+        """With the weights that ship, if it has none."""
+        if self.params is not None:
+            return self
+        from jflnr.network.weights import shipped
+
+        return dataclasses.replace(self, params=shipped(self.name, Read))
+
+    def images(
+        self,
+        frame: Frame,
+        names: tuple[str, ...],
+        scene: Scene | None = None,
+        filters: Filters = FILTERS,
+    ) -> Parts:
+        """Those of `picture`, and what the network reads of the surfaces."""
+        scene = scene_of(frame) if scene is None else scene
+        images = super().images(frame, names, scene, filters)
+        add = _surfaces if filters.average is None else _surfaces.__wrapped__
+        return images | {"surfaces": add(frame, scene, images["guides"])}
+
+    def before_network(self) -> tuple[Stage, ...]:
+        """The stages before the one that corrects."""
+        *fit, _ = WholePicture.stages(dataclasses.replace(self, with_error=True, lobes=False))
+        gives, reads = (("fitted", 0), ("noise", 0)), ("image", "error")
+        return (*fit, Stage(put, gives, reads, True, REACH, align=DETAIL_BLOCK, composes=True))
+
+    def stages(self) -> tuple[Stage, ...]:
+        lobes = [("passes", 0)] * self.lobes
+        gives = (("image", 0), *[("error", 0)] * self.with_error, *lobes)
+        scales = unet.scales_of(self.ready(len(self.guides), COLOURS).params)
+        reach = EVERYTHING if self.lobes else unet.reach_of(scales)
+        last = Stage(
+            correct, gives, ("fitted", "noise"), True, reach, align=1 << scales, composes=True
+        )
+        return (*self.before_network(), last)
+
+
+@QUIETLY
+def put(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
+    """The picture that the network is to correct, `(H, W, 3)`, and its error."""
+    error = parts["error"] * light_of(parts["surface"])[..., None]
+    return {"fitted": composed(parts, known.get("average", average)), "noise": error}
+
+
+def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
+    """The corrected picture, as `regression.picture.compose` gives it."""
+    read, unit = to_read(parts, known)
+    image = known.get("corrected", corrected)(method.params, read) * unit
+    fitted = parts["fitted"]
+    xp: Any = fitted.__array_namespace__()
+    image = xp.where(xp.isfinite(fitted), image, fitted)
+    return finished(method, image, parts | {"error": parts["noise"]})
+
+
+def corrected(params: unet.Params, read: Read) -> Any:
+    """The picture `(H, W, 3)` that the network makes of what it reads."""
+    return read.corrected(gains(params, read))
+
+
+@jit
+def _surfaces(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
+    picture = picture_in(frame, scene)
+    xp: Any = picture.beauty.__array_namespace__()
+    there = [name for name in GUIDES if getattr(picture, name) is not None]
+    clean = dict(zip(there, guides, strict=True))
+    number = xp.nan_to_num
+    albedo, normal = number(clean["albedo"]), number(clean["normal"])
+    left = number(picture.normal) - normal
+    none, one = xp.zeros_like(normal), xp.ones_like(normal[..., :1])
+    guess = xp.where(scene.averaged, SAMPLES, 1) * one
+    samples = guess if frame.samples is None else frame.samples
+    return {
+        "albedo": albedo,
+        "albedo_left": xp.clip(number(picture.albedo), 0, 1) - albedo,
+        "normal": normal,
+        "normal_left": xp.sqrt(xp.sum(left**2, axis=-1, keepdims=True)),
+        "seen_normal": number(clean.get("seen_normal", none)),
+        "depth": xp.clip(number(clean.get("depth", one)), 0, DEEPEST),
+        "samples": xp.where(samples > 0, samples, guess),
+    }
