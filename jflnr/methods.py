@@ -38,11 +38,35 @@ DEFAULT, WHOLE = "flr", "picture"
 # Those of indirect light, which every frame has.
 METHODS = tuple(name for name in HOMES if name != WHOLE)
 BACKENDS = ("jax", "opencl")
+AUTO = "auto"
+# What a method may be asked for beside the picture, which only JAX tells.
+ASKED = ("with_error", "lobes")
 
 
 def default_of(frame: Any) -> str:
     """The name of the method that denoises a frame if nobody says."""
     return DEFAULT if frame.beauty is None else WHOLE
+
+
+def backend_for(backend: str, method: Any, tile: int | None = None, **options: Any) -> str:
+    """What runs a method: `backend`, or, if that is `auto`, OpenCL where it can, else JAX.
+
+    It can where there is a device, kernels of the method (all that denoise by default have some),
+    no tiles and nothing of `ASKED`, in the method or in options.
+    """
+    checks.choice("backend", backend, (*BACKENDS, AUTO))
+    if backend != AUTO:
+        return backend
+    asked = any(options.get(name, getattr(method, name, False)) for name in ASKED)
+    if tile is not None or asked or "opencl" not in getattr(method, "backends", BACKENDS):
+        return "jax"
+    from jflnr.opencl.devices import NoDevice, all_devices
+
+    try:
+        all_devices()
+    except NoDevice:
+        return "jax"
+    return "opencl"
 
 
 def method_of(method: Any = DEFAULT, **options: Any) -> Any:

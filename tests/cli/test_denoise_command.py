@@ -97,7 +97,7 @@ def test_options_reach_the_denoiser(tmp_path: Path, frame_file: Path, stand_in: 
     fitted = {"format": "jflnr-parameters", "version": 1, "sigma": 5, "eps": 1e-2}
     params.write_text(json.dumps(fitted | {"eps_prime": 1e-3, "block": 4, "guides": ["depth"]}))
     out = ("-o", tmp_path / "out.exr", "--overwrite")
-    assert run(frame_file, *out) == 0
+    assert run(frame_file, *out, "--backend", "jax") == 0
     assert run(frame_file, *out, "--params", params) == 0
     assert run(frame_file, *out, "--params", params, "--eps", "0.5", "--guides", "normal,ao") == 0
     assert run(frame_file, *out, "--block", "2", "--guides", "") == 0
