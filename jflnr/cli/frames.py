@@ -252,19 +252,22 @@ class Worker:
 @contextlib.contextmanager
 def _compiling_is_told(denoiser: "jflnr.Denoiser", quiet: bool) -> Iterator[None]:
     """Say on stderr what takes so long, if it is kernels that are compiled."""
+    from tqdm import tqdm
+
+    done = threading.Event()
 
     def tell() -> None:
-        if denoiser.backend == "opencl" and denoiser.context.compiles and not quiet:
-            from tqdm import tqdm
+        while not done.wait(SILENCE):
+            if denoiser.context.compiles:
+                tqdm.write("jflnr: compiling kernels for this machine, once ...", file=sys.stderr)
+                return
 
-            tqdm.write("jflnr: compiling kernels for this machine, once ...", file=sys.stderr)
-
-    timer = threading.Timer(SILENCE, tell)
-    timer.start()
+    if denoiser.backend == "opencl" and not quiet:
+        threading.Thread(target=tell, daemon=True).start()
     try:
         yield
     finally:
-        timer.cancel()
+        done.set()
 
 
 def failure(job: Job, error: BaseException) -> Record:

@@ -138,9 +138,10 @@ def test_quiet_prints_errors_only(
 def test_verbose_says_how_the_file_was_read(
     tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(frame_file, "-o", tmp_path / "out.exr", "--verbose") == 0
+    command = (frame_file, "-o", tmp_path / "out.exr", "--verbose", "--backend", "jax")
+    assert run(*command) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1:] == ["  layout: jflnr", "  guides: normal, depth, ao"]
+    assert lines[1:] == ["  layout: jflnr", "  backend: jax", "  guides: normal, depth, ao"]
 
 
 @pytest.mark.usefixtures("stand_in")
