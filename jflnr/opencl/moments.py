@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/moments.cl and centre.cl; its twin in JAX is jflnr/regression/moments.py."""
+"""Host side of kernels_cl/centre.cl and moments.cl; the twin is jflnr/regression/moments.py."""
 
 from typing import Any
 
