@@ -28,6 +28,7 @@ NAMES = (
     "sequences",
     "bmfr",
     "whole",
+    "first_picture",
     "threads",
 )
 

@@ -16,7 +16,7 @@ from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
 from jflnr.lazy import check_not_forked, jax
-from jflnr.methods import BACKENDS, DEFAULT, default_of, method_of
+from jflnr.methods import BACKENDS, DEFAULT, backend_for, default_of, method_of
 from jflnr.regression.arguments import block_for
 from jflnr.stages import Parts, on_frame
 
@@ -86,6 +86,8 @@ def denoise(
     on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
+    backend: `jax`, `opencl`, or `auto`: OpenCL where there is a device and it can do what is asked
+    for, else JAX. `jax.jit` and gradients need `jax`.
     tile: work on about `tile` x `tile` pixels at a time, with the same result in less memory
     (docs/large.md); on all of them if None.
     Pixels outside `frame.mask`, and any with a NaN or infinity, are left out of the fit.
@@ -105,7 +107,7 @@ class Denoiser:
 
     Arguments as of `denoise`. device: of the opencl backend, as `jflnr devices` numbers or names
     it, or a `jflnr.opencl.Context`; the best one if None. Called with a frame it returns what
-    `denoise` does; `next` takes the frames of a shot in their order.
+    `denoise` does; `next` takes the frames of a shot in their order. `backend` is what runs it.
     """
 
     def __init__(
@@ -118,12 +120,13 @@ class Denoiser:
         device: Any = None,
         **options: Any,
     ) -> None:
-        checks.choice("backend", backend, BACKENDS)
         if tile is not None:
             checks.positive_integer("tile", tile)
-        self.backend, self.guides, self.options = backend, guides, options
+        method = None if method is None else method_of(method, **options)
+        self.backend = backend_for(backend, method, tile)
+        self.guides, self.options = guides, options
         self.tile, self.state, self._device = tile, None, device
-        self.method = None if method is None else self._checked(method_of(method, **options))
+        self.method = None if method is None else self._checked(method)
 
     def _checked(self, method: Any) -> Any:
         """The method, if it can do what is asked for."""

@@ -6,13 +6,13 @@
 #include "models.h"
 
 // own: (h, pitch / GROUP, C, GROUP), what the models give at the mean guides of their blocks; 0 where
-// its brightness would be below zero. COUNT: planes of moments. Global size (pitch / WIDTH, h).
+// its brightness would be below zero. moments: K + 1 planes. Global size (pitch / WIDTH, h).
 kernel void own_light(
     int h, int pitch, global const float *moments, global const float *models, global float *own)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
-    moments += AT(x, y, pitch, COUNT);
+    moments += AT(x, y, pitch, K + 1);
     models += AT(x, y, pitch, MODELS);
     own += AT(x, y, pitch, C);
     const real n = READ(moments);

@@ -16,7 +16,7 @@
 #if G <= 8
 #define UNROLL _Pragma("unroll")
 #else
-#define UNROLL
+#define UNROLL _Pragma("unroll 1")
 #endif
 #define LOWER(i, j) ((i) * ((i) + 1) / 2 + (j))
 

@@ -1,38 +1,123 @@
-// One level of adaptive FLR: the second pass of the window, along columns, and the models under it.
+// One level of adaptive FLR: what must be alike in a window, the edge-aware window in two passes, along
+// rows and along columns, and the models under it. The models' numbers of guides and channels are
+// constants; that there is a coarser grid is told when the kernels run, as `refines` (window.h).
 //
-// Defines beside those of the headers: ROUNDING, roundings of a sum of squares that may add up;
-// DOWN, 1 if neighbouring work-items are below each other: on a processor, what one has read is then
-// still in the cache for the next.
+// Defines beside those of the headers: NOISE, 1 if a plane of noise lies behind the moments; POSITIONS, 1
+// if the position in the window is two more guides; ROUNDING, roundings of a sum of squares that may
+// add up; DOWN, 1 if neighbouring work-items of `fit` are below each other: on a processor, what one has
+// read is then still in the cache for the next.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "grids.h"
 #include "window.h"
-#include "rows.h"
 #include "models.h"
 #define G (Q + 2 * POSITIONS)
 #include "least_squares.h"
 
-// Eight sums at a time stay in registers while the taps go by.
-#define TOGETHER 8
+// What the pass along rows leaves for the pass along columns: ROWS planes, as in grids.h.
+#define ROW_X(i) (K + NOISE + (i))
+#define ROW_XX ROW_X(Q + 1 + C)
+#define ROWS (K + NOISE + POSITIONS * (Q + C + 2))
 
-// sums: of the first `count` planes, no more than TOGETHER, over the column. rows: plane 0 at the block.
-// moved: how far away each tap's row lies.
+// features: the mean guides of each block, times guide_scale. And, if `refines`, brightness_scale
+// log(luminance / mean + 0.1) with the luminance that the coarser grids found, and that level.
+//
+// moments: (h, pitch / GROUP, K + NOISE, GROUP). found: models of the next coarser grid.
+// Global size (pitch / WIDTH, h).
+kernel void features(
+    int h, int pitch, int refines, int coarse_h, int coarse_w, int coarse_pitch, float guide_scale,
+    float brightness_scale, global const float *mean, global const float *moments,
+    global const float *found, global float *features)
+{
+    const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
+    if (x >= pitch || y >= h) return;
+    moments += AT(x, y, pitch, K + NOISE);
+    features += AT(x, y, pitch, FEATURE_PLANES);
+    for (int q = 0; q <= Q; ++q) EXPECT_BLOCK(moments + XX(q, 0) * GROUP, K + NOISE);
+    const real n = READ(moments);
+    const real per_pixel = n > 1e-12f ? 1 / n : (real)0;
+#define GUIDE(q) (READ(moments + XX((q) + 1, 0) * GROUP) * per_pixel)
+    for (int q = 0; q < Q; ++q) WRITE(guide_scale * GUIDE(q), features + q * GROUP);
+    if (!refines) return;
+    const coarse_t coarse = coarse_at(found, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
+    real luminance = doubled(&coarse, LIGHT_PLANE(0));
+    for (int q = 0; q < Q; ++q) luminance += GUIDE(q) * doubled(&coarse, LIGHT_PLANE(q + 1));
+    luminance = MAX(luminance, 0);
+    WRITE(brightness_scale * log(luminance / mean[0] + 0.1f), features + Q * GROUP);
+    WRITE(luminance, features + (Q + 1) * GROUP);
+}
+
+INLINE real along_row(global const float *p, int x, int pitch, const real *weights)
+{
+    real sum = 0;
+    FOR_TAPS(p, K + NOISE, ADD_WEIGHTED)
+    return sum;
+}
+
+// The window along the rows.
+//
+//   m[k] = sum_t w_t plane[k](x + t)                      k = 0 .. K - 1
+//   noise = sum_t w_t^2 plane[K](x + t)                   if NOISE
+//   m_x[k] = sum_t w_t (t / sigma) plane(x + t)           the Q + 1 + C moments with 1
+//   m_xx = sum_t w_t (t / sigma)^2 plane[0](x + t)        the last two if POSITIONS
+//
+// A product with the position of block centres is a pass whose weights are multiplied by it.
+//
+// moments: (h, pitch / GROUP, K + NOISE, GROUP). Global size (pitch / WIDTH, h).
+kernel void window_rows(
+    int h, int pitch, int refines, float sigma, global const float *features,
+    global const float *moments, global float *rows)
+{
+    const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
+    if (x >= pitch || y >= h) return;
+    moments += AT(x, y, pitch, K + NOISE);
+    rows += AT(x, y, pitch, ROWS);
+    real weights[TAPS], more[TAPS];
+    row_weights(features, refines, x, y, pitch, sigma, weights);
+#define ALONG(k, weights) along_row(moments + (k) * GROUP, x, pitch, weights)
+    for (int k = 0; k < K; ++k) WRITE(ALONG(k, weights), rows + k * GROUP);
+#if NOISE
+#pragma unroll
+    for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * weights[t];
+    WRITE(ALONG(K, more), rows + K * GROUP);
+#endif
+#if POSITIONS
+    const float per_sigma = 1 / sigma;
+#pragma unroll
+    for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * ((t - REACH) * per_sigma);
+    for (int i = 0; i <= Q; ++i) WRITE(ALONG(XX(i, 0), more), rows + ROW_X(i) * GROUP);
+    for (int c = 0; c < C; ++c) WRITE(ALONG(XY(0, c), more), rows + ROW_X(Q + 1 + c) * GROUP);
+#pragma unroll
+    for (int t = 0; t < TAPS; ++t) more[t] *= (t - REACH) * per_sigma;
+    WRITE(ALONG(0, more), rows + ROW_XX * GROUP);
+#endif
+}
+
+// A loop of which the compiler is to make no copies: they took it a minute.
+#define ROLLED _Pragma("unroll 1")
+
+// sums: of `count` planes, a constant, over the column. rows: the first of them at the block. moved: how
+// far away each tap's row lies. Up to eight sums at a time stay in registers while the taps go by.
 INLINE void along_column(
     global const float *rows, const long *moved, const real *weights, int count, real *sums)
 {
-    real total[TOGETHER];
+    const int parts = (count + 7) / 8, together = (count + parts - 1) / parts;
+    ROLLED
+    for (int part = 0; part < parts; ++part) {
+        const int first = MIN(part * together, count - together);
+        real total[8];
 #pragma unroll
-    for (int k = 0; k < TOGETHER; ++k) total[k] = 0;
+        for (int k = 0; k < together; ++k) total[k] = 0;
 #pragma unroll
-    for (int t = 0; t < TAPS; ++t) {
+        for (int t = 0; t < TAPS; ++t) {
+            global const float *row = rows + moved[t] + first * GROUP;
 #pragma unroll
-        for (int k = 0; k < TOGETHER; ++k)
-            if (k < count) total[k] += weights[t] * READ(rows + moved[t] + k * GROUP);
+            for (int k = 0; k < together; ++k) total[k] += weights[t] * READ(row + k * GROUP);
+        }
+#pragma unroll
+        for (int k = 0; k < together; ++k) sums[first + k] = total[k];
     }
-#pragma unroll
-    for (int k = 0; k < TOGETHER; ++k)
-        if (k < count) sums[k] = total[k];
 }
 
 // The pass along columns, then least squares with a ridge that grows with the noise: the variance of
@@ -41,8 +126,8 @@ INLINE void along_column(
 // side: of a block in pixels. rows: from window_rows. models: see models.h.
 // Global size (pitch / WIDTH, h), or the other way round if DOWN.
 kernel void fit(
-    int h, int pitch, int side, float sigma, float eps, float eps_prime, float noise_ridge,
-    float position_ridge, global const float *mean, constant float *shift,
+    int h, int pitch, int refines, int side, float sigma, float eps, float eps_prime,
+    float noise_ridge, float position_ridge, global const float *mean, constant float *shift,
     global const float *features, global const float *rows, global float *models)
 {
     const int x = (int)get_global_id(DOWN ? 1 : 0) * WIDTH, y = get_global_id(DOWN ? 0 : 1);
@@ -51,54 +136,47 @@ kernel void fit(
     int to_row[TAPS];
     long moved[TAPS];
     real weights[TAPS], more[TAPS];
-    column_weights(features, x, y, h, pitch, sigma, to_row, weights);
+    column_weights(features, refines, x, y, h, pitch, sigma, to_row, weights);
 #pragma unroll
     for (int t = 0; t < TAPS; ++t) moved[t] = (long)to_row[t] * pitch * ROWS;
 
-    real sums[ROWS], xx[XX(G, G) + 1], xy[(G + 1) * C], shifts[G + 1], variance = 0;
-#pragma unroll
-    for (int k = 0; k < ROWS; k += TOGETHER)
-        along_column(rows + k * GROUP, moved, weights, ROWS - k, sums + k);
+    real sums_xx[XX(G, G) + 1], sums_xy[(G + 1) * C], shifts[G + 1], variance = 0;
+    along_column(rows, moved, weights, XY(0, 0), sums_xx);
+    along_column(rows + XY(0, 0) * GROUP, moved, weights, (Q + 1) * C, sums_xy);
 #if NOISE
 #pragma unroll
     for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * weights[t];
     along_column(rows + K * GROUP, moved, more, 1, &variance);
 #endif
     UNROLL
-    for (int k = 0; k < XY(0, 0); ++k) xx[k] = sums[k];
-    UNROLL
-    for (int k = 0; k < (Q + 1) * C; ++k) xy[k] = sums[XY(0, 0) + k];
-    UNROLL
     for (int q = 0; q < Q; ++q) shifts[q] = shift[q];
 #if POSITIONS
+    along_column(rows + ROW_X(0) * GROUP, moved, weights, Q + 1, sums_xx + XX(Q + 1, 0));
+    along_column(rows + ROW_XX * GROUP, moved, weights, 1, sums_xx + XX(Q + 1, Q + 1));
+    along_column(rows + ROW_X(Q + 1) * GROUP, moved, weights, C, sums_xy + (Q + 1) * C);
     const float per_sigma = 1 / sigma;
 #pragma unroll
     for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * ((t - REACH) * per_sigma);
-    UNROLL
-    for (int i = 0; i <= Q; ++i) along_column(rows + XX(i, 0) * GROUP, moved, more, 1, xx + XX(Q + 2, i));
-    along_column(rows + ROW_X(0) * GROUP, moved, more, 1, xx + XX(Q + 2, Q + 1));
-    UNROLL
-    for (int c = 0; c < C; ++c)
-        along_column(rows + XY(0, c) * GROUP, moved, more, 1, xy + (Q + 2) * C + c);
+    ROLLED
+    for (int i = 0; i <= Q; ++i) along_column(rows + XX(i, 0) * GROUP, moved, more, 1, sums_xx + XX(Q + 2, i));
+    along_column(rows + ROW_X(0) * GROUP, moved, more, 1, sums_xx + XX(Q + 2, Q + 1));
+    along_column(rows + XY(0, 0) * GROUP, moved, more, C, sums_xy + (Q + 2) * C);
 #pragma unroll
     for (int t = 0; t < TAPS; ++t) more[t] *= (t - REACH) * per_sigma;
-    along_column(rows, moved, more, 1, xx + XX(Q + 2, Q + 2));
-    UNROLL
-    for (int i = 0; i <= Q; ++i) xx[XX(Q + 1, i)] = sums[ROW_X(i)];
-    xx[XX(Q + 1, Q + 1)] = sums[ROW_XX];
-    UNROLL
-    for (int c = 0; c < C; ++c) xy[(Q + 1) * C + c] = sums[ROW_X(Q + 1 + c)];
+    along_column(rows, moved, more, 1, sums_xx + XX(Q + 2, Q + 2));
     // Positions are centred on the window already, so only their own ridge is added.
-    xx[XX(Q + 1, Q + 1)] += position_ridge * xx[0];
-    xx[XX(Q + 2, Q + 2)] += position_ridge * xx[0];
+    sums_xx[XX(Q + 1, Q + 1)] += position_ridge * sums_xx[0];
+    sums_xx[XX(Q + 2, Q + 2)] += position_ridge * sums_xx[0];
     shifts[Q] = shifts[Q + 1] = 0;
 #endif
 
-    const real n = MAX(xx[0], 1e-12f) * side, per_pixel = xx[0] > 1e-12f ? 1 / xx[0] : (real)0;
+    const real count = sums_xx[0], n = MAX(count, 1e-12f) * side;
+    const real per_pixel = count > 1e-12f ? 1 / count : (real)0;
+    real xx[XX(G, G) + 1], xy[(G + 1) * C];
     UNROLL
-    for (int k = 0; k <= XX(G, G); ++k) xx[k] *= per_pixel;
+    for (int k = 0; k <= XX(G, G); ++k) xx[k] = sums_xx[k] * per_pixel;
     UNROLL
-    for (int k = 0; k < (G + 1) * C; ++k) xy[k] *= per_pixel;
+    for (int k = 0; k < (G + 1) * C; ++k) xy[k] = sums_xy[k] * per_pixel;
     variance = variance / (n * n);
     real luminance = 0;
 #pragma unroll
@@ -110,10 +188,10 @@ kernel void fit(
     real coefficients[(G + 1) * C], zero = 0;  // stays 0 unless a coefficient is not finite
     least_squares(
         xx, xy, shifts, eps + ridge, eps_prime + ridge, ROUNDING * FLT_EPSILON, coefficients);
-#pragma unroll
+    UNROLL
     for (int i = 0; i < (Q + 1) * C; ++i) zero += 0 * coefficients[i];
     models += AT(x, y, pitch, MODELS);
-#pragma unroll
+    UNROLL
     for (int q = 0; q <= Q; ++q) {
         real brightness = 0;
 #pragma unroll

@@ -15,8 +15,8 @@
 // The three planes of `signal`, (h, pitch / GROUP, 3, GROUP): d^2 and N, both relative to a squared
 // brightness, and 1 where there are pixels.
 //
-// Define: COUNT, the number of planes of moments. fine, coarse: models. features: of the finer grid, all
-// Q + 2. Global size (pitch / WIDTH, h).
+// moments: K + 1 planes. fine, coarse: models. features: of the finer grid, all Q + 2.
+// Global size (pitch / WIDTH, h).
 kernel void signal(
     int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, float guide_scale,
     global const float *mean, global const float *moments, global const float *features,
@@ -38,7 +38,7 @@ kernel void signal(
     const real more = READ(fine + VARIANCE * GROUP) - doubled(&at, VARIANCE);
     const real luminance = READ(features + (Q + 1) * GROUP);
     const real reference = luminance * luminance + 0.01f * mean[0] * mean[0];
-    const mask there = READ(moments + AT(x, y, pitch, COUNT)) > 1e-12f;
+    const mask there = READ(moments + AT(x, y, pitch, K + 1)) > 1e-12f;
     WRITE(there ? d * d / reference : (real)0, signal);
     WRITE(there ? MAX(more, 0) / reference : (real)0, signal + GROUP);
     WRITE(there ? (real)1 : (real)0, signal + 2 * GROUP);
@@ -47,13 +47,13 @@ kernel void signal(
 // The window of the coarser grid over the three planes: along rows, then along columns to the share.
 // halved, rows: (h, pitch / GROUP, 3, GROUP). share: (h, pitch). Global size (pitch / WIDTH, h).
 kernel void share_rows(
-    int h, int pitch, float sigma, global const float *features, global const float *halved,
+    int h, int pitch, int refines, float sigma, global const float *features, global const float *halved,
     global float *rows)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
     real weights[TAPS];
-    row_weights(features, x, y, pitch, sigma, weights);
+    row_weights(features, refines, x, y, pitch, sigma, weights);
     const long block = AT(x, y, pitch, 3);
     for (int k = 0; k < 3; ++k) {
         global const float *p = halved + block + k * GROUP;
@@ -64,14 +64,14 @@ kernel void share_rows(
 }
 
 kernel void share_columns(
-    int h, int pitch, float sigma, float caution, global const float *features,
+    int h, int pitch, int refines, float sigma, float caution, global const float *features,
     global const float *rows, global float *share)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
     int to_row[TAPS];
     real weights[TAPS], sums[3];
-    column_weights(features, x, y, h, pitch, sigma, to_row, weights);
+    column_weights(features, refines, x, y, h, pitch, sigma, to_row, weights);
     rows += AT(x, y, pitch, 3);
 #pragma unroll
     for (int k = 0; k < 3; ++k) {

@@ -1,7 +1,7 @@
 // Adaptive FLR: how far its result may be from the truth (jflnr/regression/uncertainty.py).
 //
-// Defines beside those of the headers: COUNT, the number of planes of moments; FIRST, if the coarser
-// grid is the coarsest, of which only the variance of its models is known.
+// Define beside those of the headers: FIRST, if the coarser grid is the coarsest, of which only the
+// variance of its models is known.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -9,7 +9,7 @@
 #include "models.h"
 
 // Two planes (h, pitch / GROUP, 2, GROUP) from those of the coarser grid, `before`: the variance of what
-// the models keep, and the square of what the merge left out. share: of the coarser grid.
+// the models keep, and the square of what the merge left out. moments: K + 1 planes. share: of the coarser grid.
 // Global size (pitch / WIDTH, h).
 kernel void error_step(
     int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, global const float *moments,
@@ -18,7 +18,7 @@ kernel void error_step(
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
-    moments += AT(x, y, pitch, COUNT);
+    moments += AT(x, y, pitch, K + 1);
     fine += AT(x, y, pitch, MODELS);
     after += AT(x, y, pitch, 2);
     const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);

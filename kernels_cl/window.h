@@ -3,10 +3,11 @@
 // Block i weighs block j of its row or column by
 //   exp(-d^2 / (2 sigma^2)) exp(-|f_i - f_j|^2 / 2),   d = their distance in blocks
 //
-// Defines: REACH, blocks on each side that the window extends over, at most GROUP; FEATURES, the number
-// of planes of f; FEATURE_PLANES, how many lie together with these first.
+// Define: REACH, blocks on each side that the window extends over, at most GROUP. refines: 1 if there is
+// a coarser grid, 0 if not; f is then one plane more than the guides, and another one lies behind it.
 
 #define TAPS (2 * REACH + 1)
+#define FEATURE_PLANES (Q + 2 * refines)
 #define ADD_WEIGHTED(t, v) sum += weights[t] * (v);
 
 // FOR_TAPS(p, count, DO) does DO(t, v) for every tap t, v being what it has of plane p, at the blocks x
@@ -46,12 +47,12 @@ INLINE void weigh(real *weights, float sigma)
 // TAPS weights along the row, 0 outside. features: (h, pitch / GROUP, FEATURE_PLANES, GROUP).
 #define IN_ROW(i) (x + (i) + t - REACH >= 0 && x + (i) + t - REACH < pitch ? 1.0f : 0.0f)
 INLINE void row_weights(
-    global const float *features, int x, int y, int pitch, float sigma, real *weights)
+    global const float *features, int refines, int x, int y, int pitch, float sigma, real *weights)
 {
     features += AT(x, y, pitch, FEATURE_PLANES);
 #pragma unroll
     for (int t = 0; t < TAPS; ++t) weights[t] = 0;
-    for (int f = 0; f < FEATURES; ++f) {
+    for (int f = 0; f < Q + refines; ++f) {
         global const float *p = features + f * GROUP;
         const real here = READ(p);
 #define ADD_SQUARE(t, v) weights[t] += ((v) - here) * ((v) - here);
@@ -65,8 +66,8 @@ INLINE void row_weights(
 
 // The same along the column. rows: how many rows each tap lies below, 0 for one that is outside.
 INLINE void column_weights(
-    global const float *features, int x, int y, int h, int pitch, float sigma, int *rows,
-    real *weights)
+    global const float *features, int refines, int x, int y, int h, int pitch, float sigma,
+    int *rows, real *weights)
 {
     features += AT(x, y, pitch, FEATURE_PLANES);
 #pragma unroll
@@ -75,7 +76,7 @@ INLINE void column_weights(
         rows[t] = row < 0 || row >= h ? 0 : row - y;
         weights[t] = 0;
     }
-    for (int f = 0; f < FEATURES; ++f) {
+    for (int f = 0; f < Q + refines; ++f) {
         const real here = READ(features + f * GROUP);
 #pragma unroll
         for (int t = 0; t < TAPS; ++t) {

@@ -17,7 +17,8 @@ from jflnr import exr, methods, temporal
 from jflnr.cli import main
 from jflnr.frame import Frame
 from jflnr.images.inputs import plain_images
-from jflnr.methods import method_of
+from jflnr.methods import backend_for, method_of
+from jflnr.opencl import devices
 from jflnr.opencl import temporal as on_device
 from jflnr.regression.apply import apply
 from jflnr.regression.moments import collect
@@ -155,3 +156,28 @@ def test_a_batch_is_its_images_one_by_one(rng: np.random.Generator) -> None:
 def test_the_package_lists_what_it_exports() -> None:
     assert {"Denoiser", "FLR", "denoise", "flr", "temporal"} <= set(dir(jflnr))
     assert all(getattr(jflnr, name) is not None for name in dir(jflnr))
+
+
+def test_auto_takes_a_device_for_what_it_can_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    flr = jflnr.FLR()
+    monkeypatch.setattr(devices, "all_devices", lambda: ["a device"])
+    assert backend_for("auto", flr) == backend_for("auto", None) == "opencl"
+    assert backend_for("jax", flr) == "jax"
+    assert backend_for("auto", flr, tile=64) == backend_for("auto", jflnr.Auto()) == "jax"
+
+    def none() -> list[str]:
+        raise devices.NoDevice("none here")
+
+    monkeypatch.setattr(devices, "all_devices", none)
+    assert backend_for("auto", flr) == "jax"
+    assert backend_for("opencl", flr) == "opencl"
+    with pytest.raises(ValueError, match="must be one of jax, opencl, auto; got 'abacus'"):
+        backend_for("abacus", flr)
+
+
+@pytest.mark.parametrize("method", [None, "flr-adaptive", "auto"])
+def test_auto_gives_what_its_choice_gives(frame: Frame, method: str | None) -> None:
+    denoiser = jflnr.Denoiser(method, backend="auto")
+    assert denoiser.backend in jflnr.BACKENDS
+    right = jflnr.denoise(frame, method, backend=denoiser.backend)
+    np.testing.assert_array_equal(denoiser(frame), right)

@@ -136,13 +136,14 @@ int main(int argc, char **argv)
     cl_mem moments = buffer((size_t)K * h * pitch, NULL), columns = buffer((size_t)K * h * wide, NULL);
     cl_mem blurred = buffer((size_t)K * h * pitch, NULL), output = buffer(C * pixels, NULL);
     cl_mem model = buffer((size_t)(Q + 1) * C * h * pitch, NULL);
-    const cl_program moments_cl = build(argv[1], "moments.cl"), blur_cl = build(argv[1], "blur.cl");
+    const cl_program centre_cl = build(argv[1], "centre.cl"), moments_cl = build(argv[1], "moments.cl");
+    const cl_program blur_cl = build(argv[1], "blur.cl");
     const cl_program solve_cl = build(argv[1], "solve.cl"), apply_cl = build(argv[1], "apply.cl");
     const cl_mem none = NULL; /* images of guides that are not used, and no weight */
 
-    run(moments_cl, "centre_rows", rows, 1, 1, "iiiibbbbbbb",
+    run(centre_cl, "centre_rows", rows, 1, 1, "iiiibbbbbbb",
         width, rows, step_x, step_y, guides, none, none, none, none, none, partial);
-    run(moments_cl, "centre", Q, 1, 1, "ibb", rows, partial, shift);
+    run(centre_cl, "centre", Q, 1, 1, "ibb", rows, partial, shift);
     run(moments_cl, "moments", pitch, h, 1, "iiiibbbbbbbbb",
         width, height, h, pitch, light, guides, none, none, none, none, none, shift, moments);
     run(blur_cl, "blur_columns", wide / WIDTH, h, K, "iiiiibbb",

@@ -27,7 +27,7 @@ from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import remarks, summary, throughput
-from jflnr.methods import BACKENDS, DEFAULT, HOMES, WHOLE
+from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
   jflnr denoise render.exr -o out/              a file of Blender, Mitsuba 3, pbrt-v4 or our own
@@ -54,7 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --method auto: print what it chose and why, and write a map, OUT.plan.png",
     )
-    add("--backend", default="jax", choices=BACKENDS, help="what runs it (jax)")
+    add(
+        "--backend",
+        default=AUTO,
+        choices=(AUTO, *BACKENDS),
+        help="what runs it; auto takes opencl where it can (auto)",
+    )
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--params", type=Path, metavar="FILE", help="what `jflnr fit` or `train` wrote")
     add("--sigma", type=float, help="standard deviation of the window, pixels")

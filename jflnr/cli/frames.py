@@ -1,11 +1,14 @@
 """One frame of `jflnr denoise` in three stages: read, denoise, write."""
 
 import argparse
+import contextlib
 import functools
 import json
+import sys
+import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -29,6 +32,8 @@ from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
 if TYPE_CHECKING:
     from jflnr.frame import Frame
 
+# Seconds that kernels may compile without a word.
+SILENCE = 1.0
 # What became of a frame, as JSON can hold it.
 Record = dict[str, Any]
 # What a denoiser gives, by name: `image`, and what else was asked for.
@@ -77,7 +82,10 @@ class Worker:
     @functools.cached_property
     def denoiser(self) -> "jflnr.Denoiser":
         """What denoises; made where it is used, since it does not travel to another process."""
-        return jflnr.Denoiser(**self.settings)
+        return self._another()
+
+    def _another(self, **options: Any) -> "jflnr.Denoiser":
+        return jflnr.Denoiser(**self.settings | options)
 
     def denoiser_for(self, frame: "Frame", tile: int | None) -> "jflnr.Denoiser":
         """The one for a frame, which also cleans light passes if they are asked for."""
@@ -90,8 +98,7 @@ class Worker:
         if not (whole and asked) and tile is None:
             return self.denoiser
         lobes = {"lobes": True, "method": self.settings["method"] or WHOLE}
-        others = (lobes if whole and asked else {}) | {"tile": tile}
-        return jflnr.Denoiser(**self.settings | others)
+        return self._another(tile=tile, **(lobes if whole and asked else {}))
 
     def __call__(self, job: Job) -> Record:
         return self.write(self.denoise(self.read(job)))
@@ -151,7 +158,7 @@ class Worker:
         source = layouts.load(job.source, self.arguments.spp, dict(self.arguments.map))
         self.exr_seconds["read"] += time.perf_counter() - start
         # On a device, what does not work in tiles is tried whole.
-        tile = tile if self.settings["backend"] == "jax" else None
+        tile = None if self.settings["backend"] == "opencl" else tile
         return Loaded(job, source, frame_of(source), tile)
 
     def _denoise(
@@ -165,8 +172,9 @@ class Worker:
             from jflnr.cli.strips import denoise_in_strips
 
             assert tile is not None
-            return _record(job) | denoise_in_strips(job, self.denoiser, arguments, tile)
-        method = self.denoiser.method_for(frame)
+            return _record(job) | denoise_in_strips(job, self._another(tile=tile), arguments, tile)
+        denoiser = self.denoiser_for(frame, tile)
+        method = denoiser.method_for(frame)
         if arguments.reference and (frame.reference is None or method.name in PICTURES):
             raise ValueError(
                 f"{job.source}: --reference needs a layer reference, and there is none for what "
@@ -178,11 +186,12 @@ class Worker:
             warnings.simplefilter("always", UserWarning)
             # The first frame of a kind is denoised twice, to tell compiling from denoising.
             for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
-                given = denoise_frame(frame)
+                with _compiling_is_told(denoiser, arguments.quiet):
+                    given = denoise_frame(frame)
                 times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
-        about = about_of(frame, self.denoiser, spp_of(source, arguments))
+        about = about_of(frame, denoiser, spp_of(source, arguments))
         result = result_of(frame, method, given)
         pixels = Pixels()
         pixels.add(frame, method, result.picture)
@@ -238,6 +247,27 @@ class Worker:
             write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))
         self.exr_seconds["write"] += time.perf_counter() - start
         return _record(job) | {"status": "written"} | record
+
+
+@contextlib.contextmanager
+def _compiling_is_told(denoiser: "jflnr.Denoiser", quiet: bool) -> Iterator[None]:
+    """Say on stderr what takes so long, if it is kernels that are compiled."""
+    from tqdm import tqdm
+
+    done = threading.Event()
+
+    def tell() -> None:
+        while not done.wait(SILENCE):
+            if denoiser.context.compiles:
+                tqdm.write("jflnr: compiling kernels for this machine, once ...", file=sys.stderr)
+                return
+
+    if denoiser.backend == "opencl" and not quiet:
+        threading.Thread(target=tell, daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()
 
 
 def failure(job: Job, error: BaseException) -> Record:

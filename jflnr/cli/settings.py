@@ -3,6 +3,8 @@
 import argparse
 from typing import Any
 
+from jflnr.methods import AUTO
+
 # Options that are of the default method, if no other is named.
 OF_DEFAULT = ("guides", "params", "sigma", "eps", "eps_prime")
 
@@ -14,20 +16,21 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """
     from jflnr.methods import DEFAULT, PICTURES, method_of
 
+    backend = _backend(arguments)
     name = arguments.method
     if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
         name = DEFAULT
     told = ("flr-adaptive", "flnr", "flnr-small", *PICTURES)
     if arguments.error_map and name not in told:
         raise ValueError(f"--error-map needs --method {', '.join(told)}")
-    if arguments.profile and arguments.backend != "opencl":
+    if arguments.profile and backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
     if arguments.explain and name != "auto":
         raise ValueError("--explain tells what --method auto chose, so it needs that method")
     given = {n: getattr(arguments, n) for n in ("sigma", "eps", "eps_prime", "block")}
     options = {n: value for n, value in given.items() if value is not None}
     if name is None:
-        return {"method": None, "backend": arguments.backend, **options}
+        return {"method": None, "backend": backend, **options}
     if name != "flr" and (odd := options.keys() - {"block"}):
         option = min(odd).replace("_", "-")
         raise ValueError(f"--{option} is for --method flr; {name} finds its own")
@@ -39,9 +42,16 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
         options["with_error"] = True
     return {
         "method": method_of(method, **options),
-        "backend": arguments.backend,
+        "backend": backend,
         "guides": about.get("guides") if arguments.guides is None else arguments.guides,
     }
+
+
+def _backend(arguments: argparse.Namespace) -> str:
+    """What is to run it; options that leave no choice make it for `auto`."""
+    if arguments.backend == AUTO and arguments.history is not None:
+        return "jax"
+    return "opencl" if arguments.backend == AUTO and arguments.profile else arguments.backend
 
 
 def _load(arguments: argparse.Namespace, method: Any) -> tuple[Any, dict[str, Any]]:

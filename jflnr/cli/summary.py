@@ -35,8 +35,9 @@ def summary(record: dict[str, Any], verbose: bool) -> str:
     if record["compile_seconds"]:
         text += f" (and {record['compile_seconds']:.1f} s to compile)"
     if verbose:
-        lines = [f"guides: {', '.join(record['guides']) or 'none'}", *record["notes"]]
-        text += "".join(f"\n  {line}" for line in [f"layout: {record['layout']}", *lines])
+        guides = ", ".join(record["guides"]) or "none"
+        lines = [f"layout: {record['layout']}", f"backend: {record['backend']}"]
+        text += "".join(f"\n  {line}" for line in [*lines, f"guides: {guides}", *record["notes"]])
     if "plan" in record:
         text += "".join(f"\n  {line}" for line in record["plan"])
     if "metrics" in record:

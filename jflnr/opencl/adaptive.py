@@ -142,7 +142,7 @@ def write_light(
     count, channels, w = channel_count(guides), target.shape[2], -(-target.shape[1] // (2 * block))
     shift = centre(context, guides)
     moments = collect(context, target, guides, shift, 2 * block, weight, light=True)
-    mean = frame_mean(context, moments, w, count)
+    mean = frame_mean(context, moments, w, count, channels)
     run = Run(context, count, channels, numbers_of(method), shift, mean)
     pilot = fit_pilot(run, moments, w, block)
     grid = collect_weighted(run, target, guides, pilot, weight, block)

@@ -58,6 +58,11 @@ class Context:
         """The module pyopencl. Raises `NoDevice` in a process in which it cannot be used."""
         return devices.pyopencl()
 
+    @property
+    def compiles(self) -> bool:
+        """Whether programs have been compiled that no earlier run had left on disk."""
+        return bool(self._to_keep)
+
     def width(self, block: int | None = None, across: bool = False) -> int:
         """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given.
 

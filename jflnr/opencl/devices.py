@@ -19,6 +19,9 @@ class NoDevice(ImportError):
 def pyopencl() -> ModuleType:
     """The module, or `NoDevice` that says how to get it."""
     os.environ.setdefault("PYOPENCL_NO_CACHE", "1")  # drivers have a cache of their own
+    # PoCL would compile each kernel for its size of work-group, and for any size to keep it: the
+    # latter is as fast.
+    os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")
     try:
         import pyopencl
         import pyopencl.array

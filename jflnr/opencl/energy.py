@@ -7,14 +7,15 @@ from jflnr.opencl.grids import Grid, Run, brightness_defines
 from jflnr.opencl.moments import pixel_defines
 
 
-def frame_mean(context: Context, moments: Any, w: int, guides: int) -> Any:
+def frame_mean(context: Context, moments: Any, w: int, guides: int, channels: int) -> Any:
     """Mean brightness of the usable pixels, 1 if there is no light, and the sum of blocks, `(2,)`.
 
-    moments: `(K, h, pitch)`, of the brightness, with w columns. guides: the number Q.
+    moments: `(K, h, pitch)`, of the brightness, with w columns. guides, channels: the numbers
+    Q and C.
     """
     h, pitch = moments.shape[1:]
     partial, mean = context.empty((h, 2)), context.empty((2,))
-    defines = {"Q": guides, "C": 1, "WIDTH": 1}
+    defines = {"Q": guides, "C": channels, "WIDTH": 1}
     context.run("light_rows", "energy.cl", defines, (h,), (h, w, pitch, moments, partial))
     context.run("light_mean", "energy.cl", defines, (1,), (h, partial, mean))
     return mean

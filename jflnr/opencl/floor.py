@@ -11,5 +11,5 @@ def own_light(run: Run, merged: Grid, moments: Grid) -> Grid:
     h, w, pitch = merged.sizes
     own = run.grid(run.channels, h, w)
     arguments = h, pitch, moments.planes, merged.planes, own.planes
-    run.launch("own_light", "floor.cl", merged, arguments, COUNT=moments.number)
+    run.launch("own_light", "floor.cl", merged, arguments)
     return own

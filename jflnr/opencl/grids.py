@@ -59,17 +59,23 @@ class Run(NamedTuple):
         return Grid(self.context.empty((h, -(-w // GROUP), count, GROUP)), w)
 
     def launch(
-        self, name: str, file: str, grid: Grid, arguments: Sequence[Any], **defines: int
+        self,
+        name: str,
+        file: str,
+        grid: Grid,
+        arguments: Sequence[Any],
+        down: bool = False,
+        **defines: int,
     ) -> None:
         """Run a kernel on the blocks of a grid, WIDTH neighbours per work-item.
 
-        With a define DOWN neighbouring work-items are below each other.
+        down: neighbouring work-items are below each other.
         """
         width = defines.setdefault("WIDTH", self.context.width())
         everywhere = {"Q": self.guides, "C": self.channels, "REACH": REACH}
         everywhere |= brightness_defines(self.channels)
         h, pitch = grid.size
-        size = (h, pitch // width) if defines.get("DOWN") else (pitch // width, h)
+        size = (h, pitch // width) if down else (pitch // width, h)
         self.context.run(name, file, everywhere | defines, size, arguments)
 
 

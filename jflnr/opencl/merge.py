@@ -10,19 +10,19 @@ def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
 
     Means are taken under the windows of the coarser level.
     """
-    options, windows = coarse.defines, coarse.features.planes
-    signal = halve(run, _signal(run, fine, coarse, options))
+    windows = coarse.features.planes
+    signal = halve(run, _signal(run, fine, coarse))
     h, w, pitch = signal.sizes
     rows, share = run.grid(3, h, w), run.grid(1, h, w)
-    sizes = h, pitch, run.numbers.sigma
+    sizes = h, pitch, coarse.refines, run.numbers.sigma
     along_rows = *sizes, windows, signal.planes, rows.planes
-    run.launch("share_rows", "merge.cl", signal, along_rows, COUNT=0, **options)
+    run.launch("share_rows", "merge.cl", signal, along_rows)
     down = *sizes, run.numbers.caution, windows, rows.planes, share.planes
-    run.launch("share_columns", "merge.cl", signal, down, COUNT=0, **options)
+    run.launch("share_columns", "merge.cl", signal, down)
     return share
 
 
-def _signal(run: Run, fine: Level, coarse: Level, options: dict[str, int]) -> Grid:
+def _signal(run: Run, fine: Level, coarse: Level) -> Grid:
     """Squared difference, what noise would make of it, and where there are pixels: three planes."""
     h, w, pitch = fine.models.sizes
     signal = run.grid(3, h, w)
@@ -30,7 +30,7 @@ def _signal(run: Run, fine: Level, coarse: Level, options: dict[str, int]) -> Gr
         h, pitch, *coarse.models.sizes, run.numbers.guide_scale, run.mean, fine.moments.planes,
         fine.features.planes, fine.models.planes, coarse.models.planes, signal.planes,
     )  # fmt: skip
-    run.launch("signal", "merge.cl", signal, arguments, COUNT=fine.moments.number, **options)
+    run.launch("signal", "merge.cl", signal, arguments)
     return signal
 
 
@@ -42,5 +42,5 @@ def merge(run: Run, fine: Grid, coarse: Grid, merged: Grid, share: Grid) -> Grid
         h, pitch, *coarse.sizes, fine.planes, coarse.planes, merged.planes, share.planes,
         result.planes,
     )  # fmt: skip
-    run.launch("merge", "merge.cl", fine, arguments, COUNT=0, FEATURES=0, FEATURE_PLANES=0)
+    run.launch("merge", "merge.cl", fine, arguments)
     return result

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/moments.cl; its twin in JAX is jflnr/regression/moments.py."""
+"""Host side of kernels_cl/centre.cl and moments.cl; the twin is jflnr/regression/moments.py."""
 
 from typing import Any
 
@@ -68,8 +68,8 @@ def centre(context: Context, guides: tuple[Any, ...], weight: Any | None = None)
     partial = context.empty((rows, count, 2))
     arguments = (width, rows, step_x, step_y, *guide_arguments(guides), weight, partial)
     sampled = sum(layer.nbytes for layer in guides) // (step_x * step_y)
-    context.run("centre_rows", "moments.cl", defines, (rows,), arguments, sampled)
-    context.run("centre", "moments.cl", defines, (count,), (rows, partial, shift))
+    context.run("centre_rows", "centre.cl", defines, (rows,), arguments, sampled)
+    context.run("centre", "centre.cl", defines, (count,), (rows, partial, shift))
     return shift
 
 

@@ -26,5 +26,7 @@ def _halve(
 ) -> Grid:
     """strides: from one row, group of neighbours and plane to the next."""
     arguments = (halves.number, *size, *strides, *halves.size, planes, halves.planes)
-    run.launch("halve", "resampling.cl", halves, arguments)
+    h, pitch = halves.size
+    lanes = run.context.width()
+    run.context.run("halve", "resampling.cl", {"WIDTH": lanes}, (pitch // lanes, h), arguments)
     return halves

@@ -20,7 +20,6 @@ NUMBERS = DEFAULT
 # Planes that are averaged over the windows, see change.cl.
 PLANES = 5
 FILE = "temporal/change.cl"
-NO_WINDOW = {"FEATURES": 0, "FEATURE_PLANES": 0}
 
 
 class Change(NamedTuple):
@@ -92,7 +91,7 @@ def _arrange(run: Run, moments: Any, w: int) -> tuple[Grid, Grid]:
     h, from_pitch = moments.shape[1:]
     grid, luminance = run.grid(plane_count(run.guides, 3) + 1, h, w), run.grid(1, h, w)
     arguments = h, w, grid.size[1], from_pitch, moments, grid.planes, luminance.planes
-    run.launch("arrange", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)
+    run.launch("arrange", FILE, grid, arguments, WIDTH=1)
     return grid, luminance
 
 
@@ -108,7 +107,7 @@ def _judge(
     features, moments, models = fit.features.planes, fit.moments.planes, fit.models.planes
 
     def launch(name: str, *arguments: Any) -> None:
-        run.launch(name, FILE, rows, (h, pitch, *arguments), **fit.defines)
+        run.launch(name, FILE, rows, (h, pitch, *arguments))
 
     scale, sigma = run.numbers.guide_scale, run.numbers.sigma
     launch("measure", DIM, scale, moments, features, models, luminance.planes, planes.planes)
@@ -123,4 +122,4 @@ def _judge(
 def _add_uncovered(run: Run, known: Any, covered: Any, grid: Grid, wrong: Any) -> None:
     """Adds what the history takes on around places that come into view to `wrong`."""
     arguments = *known.shape, grid.size[1], BLOCK, UNCOVERED, known, covered, wrong
-    run.launch("add_uncovered", FILE, grid, arguments, WIDTH=1, **NO_WINDOW)
+    run.launch("add_uncovered", FILE, grid, arguments, WIDTH=1)

@@ -30,7 +30,7 @@ def standard_error(
             coarse.models.planes, share.planes, None if before is None else before.planes,
             after.planes,
         )  # fmt: skip
-        defines = {"COUNT": fine.moments.number} | ({"FIRST": 1} if before is None else {})
+        defines = {"FIRST": 1} if before is None else {}
         run.launch("error_step", "uncertainty.cl", after, arguments, **defines)
         before = after
     assert before is not None
@@ -40,5 +40,5 @@ def standard_error(
         h, pitch, brightness.shape[1], VARIANCE, LEFT_OUT, DETAIL, run.mean, rate, brightness,
         own.planes, before.planes, error,
     )  # fmt: skip
-    run.launch("standard_error", "uncertainty.cl", before, of_grid, COUNT=0)
+    run.launch("standard_error", "uncertainty.cl", before, of_grid)
     apply(run.context, error, (), run.shift, step, (h, w, pitch), output)

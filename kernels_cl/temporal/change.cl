@@ -7,6 +7,7 @@
 #include "window.h"
 #include "models.h"
 
+#define NO_COARSER_GRID 0
 #define GLOBAL_BLOCK                                                        \
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);      \
     if (x >= pitch || y >= h) return;
@@ -60,7 +61,7 @@ kernel void change_rows(
 {
     GLOBAL_BLOCK
     real weights[TAPS];
-    row_weights(features, x, y, pitch, sigma, weights);
+    row_weights(features, NO_COARSER_GRID, x, y, pitch, sigma, weights);
     const long block = AT(x, y, pitch, PLANES);
     for (int k = 0; k < PLANES; ++k) {
         global const float *p = planes + block + k * GROUP;
@@ -81,7 +82,7 @@ kernel void judge(
     GLOBAL_BLOCK
     int to_row[TAPS];
     real weights[TAPS], sums[PLANES];
-    column_weights(features, x, y, h, pitch, sigma, to_row, weights);
+    column_weights(features, NO_COARSER_GRID, x, y, h, pitch, sigma, to_row, weights);
     rows += AT(x, y, pitch, PLANES);
     for (int k = 0; k < PLANES; ++k) {
         sums[k] = 0;

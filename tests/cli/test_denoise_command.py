@@ -97,7 +97,7 @@ def test_options_reach_the_denoiser(tmp_path: Path, frame_file: Path, stand_in: 
     fitted = {"format": "jflnr-parameters", "version": 1, "sigma": 5, "eps": 1e-2}
     params.write_text(json.dumps(fitted | {"eps_prime": 1e-3, "block": 4, "guides": ["depth"]}))
     out = ("-o", tmp_path / "out.exr", "--overwrite")
-    assert run(frame_file, *out) == 0
+    assert run(frame_file, *out, "--backend", "jax") == 0
     assert run(frame_file, *out, "--params", params) == 0
     assert run(frame_file, *out, "--params", params, "--eps", "0.5", "--guides", "normal,ao") == 0
     assert run(frame_file, *out, "--block", "2", "--guides", "") == 0
@@ -138,9 +138,10 @@ def test_quiet_prints_errors_only(
 def test_verbose_says_how_the_file_was_read(
     tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(frame_file, "-o", tmp_path / "out.exr", "--verbose") == 0
+    command = (frame_file, "-o", tmp_path / "out.exr", "--verbose", "--backend", "jax")
+    assert run(*command) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1:] == ["  layout: jflnr", "  guides: normal, depth, ao"]
+    assert lines[1:] == ["  layout: jflnr", "  backend: jax", "  guides: normal, depth, ao"]
 
 
 @pytest.mark.usefixtures("stand_in")

@@ -1,5 +1,6 @@
 """What holds for every command: exit codes, one-sentence errors, and quick answers."""
 
+import json
 import os
 import pty
 import re
@@ -70,12 +71,14 @@ def test_help_and_info_do_not_import_jax(frame_file: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
-def test_opencl_needs_no_jax(method: str, frame_file: Path, tmp_path: Path) -> None:
+def test_where_there_is_a_device_no_jax_is_needed(
+    method: str, frame_file: Path, tmp_path: Path
+) -> None:
     """It takes half of a second to import; neither are metrics that nobody asked for."""
     pytest.importorskip("pyopencl")
     heavy = "[n for n in ('jax', 'scipy.stats', 'skimage') if n in sys.modules]"
     code = f"import sys; from jflnr.cli import main; main(); print({heavy})"
-    argv = ["denoise", str(frame_file), "--backend", "opencl", "--method", method]
+    argv = ["denoise", str(frame_file), "--method", method]
     done = python("-c", code, *argv, "-o", str(tmp_path / "out.exr"))
     assert done.stdout.splitlines()[-1] == "[]", done
 
@@ -87,6 +90,7 @@ def test_a_run_keeps_its_programs_for_the_next(frame_file: Path, tmp_path: Path)
     )
     own = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
     command = [sys.executable, "-c", code, "denoise", str(frame_file), "--overwrite", "-o"]
+    command[4:4] = ["--backend", "jax"]
     kept = list[set[Path]]()
     for _ in range(2):
         done = subprocess.run(
@@ -100,6 +104,26 @@ def test_a_run_keeps_its_programs_for_the_next(frame_file: Path, tmp_path: Path)
         assert done.stdout.splitlines()[-1] == "False" and done.stderr == "", done
         kept.append(set((tmp_path / "jflnr" / "jax").glob("*-cache")))
     assert kept[0] and kept[1] == kept[0]
+
+
+def test_compiling_is_told_once(frame_file: Path, tmp_path: Path) -> None:
+    """On stderr, unless --quiet is given; a later run finds the kernels."""
+    pytest.importorskip("pyopencl")
+    command = [sys.executable, "-m", "jflnr", "denoise", frame_file, "-o", tmp_path / "out.exr"]
+    command += ["--overwrite", "--method", "flr-adaptive", "--json"]
+
+    def said(folder: str, *options: str) -> str:
+        (tmp_path / folder).mkdir(exist_ok=True)
+        kept = os.environ | {"POCL_CACHE_DIR": str(tmp_path / folder)}
+        done = subprocess.run(
+            [*command, *options], env=kept, capture_output=True, text=True, timeout=120
+        )
+        assert done.returncode == 0 and (options or json.loads(done.stdout))
+        return done.stderr
+
+    assert said("kept") == "jflnr: compiling kernels for this machine, once ...\n"
+    assert said("kept") == ""
+    assert said("other", "--quiet") == ""
 
 
 def test_a_closed_pipe_is_no_error(frame_file: Path) -> None:
