@@ -198,7 +198,8 @@ def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
     image = known.get("corrected", corrected)(method.params, read) * unit
     fitted = parts["fitted"]
     xp: Any = fitted.__array_namespace__()
-    image = xp.where(xp.isfinite(fitted), image, fitted)
+    # What is emitted, to the bit: nothing is left of it for the light passes.
+    image = xp.where(xp.isfinite(fitted), xp.maximum(image, parts["own"]), fitted)
     return finished(method, image, parts | {"error": parts["noise"]})
 
 
