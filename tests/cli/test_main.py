@@ -116,7 +116,7 @@ def test_compiling_is_told_once(frame_file: Path, tmp_path: Path) -> None:
         (tmp_path / folder).mkdir(exist_ok=True)
         kept = os.environ | {"POCL_CACHE_DIR": str(tmp_path / folder)}
         done = subprocess.run(
-            [*command, *options], env=kept, capture_output=True, text=True, timeout=120
+            [*command, *options], env=kept, capture_output=True, text=True, timeout=600
         )
         assert done.returncode == 0 and (options or json.loads(done.stdout))
         return done.stderr
