@@ -36,9 +36,10 @@ OIDN = """
 import sys
 import jflnr
 from jflnr import exr
-from experiments.whole import auxiliaries, oidn
+from experiments.peers import oidn
+from experiments.whole import auxiliaries
 frame = jflnr.read_frame(sys.argv[1])
-image = oidn(color=frame.beauty, **auxiliaries(frame))
+image = oidn.layers(color=frame.beauty, **auxiliaries(frame))
 exr.write_channels(sys.argv[2], {c: image[..., i] for i, c in enumerate("RGB")})
 """
 

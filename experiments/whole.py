@@ -131,17 +131,18 @@ def metrics(image: Array, first: np.ndarray, second: np.ndarray) -> dict[str, fl
 
 
 def draw(result: dict[str, Any], folder: Path) -> None:
-    """A table of PSNR per picture, with SSIM and FLIP of ours and the best."""
+    """A table of PSNR per picture, with SSIM and FLIP of ours with the network and the best."""
     columns = {
         "spp": "spp",
         "picture": "picture",
         "noisy_psnr": "noisy, dB",
-        "ours_psnr": "ours",
+        "ours_psnr": "picture",
+        "flnr_psnr": "flnr-picture",
         "raw_psnr": "OIDN",
         "clean_psnr": "OIDN, auxiliaries prefiltered",
-        "ours_ssim": "SSIM, ours",
+        "flnr_ssim": "SSIM, flnr-picture",
         "clean_ssim": "OIDN",
-        "ours_flip": "FLIP, ours",
+        "flnr_flip": "FLIP, flnr-picture",
         "clean_flip": "OIDN",
     }
     plots.write_text(folder / f"{NAME}.md", results.table(result["pictures"], columns))
