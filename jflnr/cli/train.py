@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jflnr.cli.common import kept, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths, kept = expand(arguments.data), expand(arguments.val)
     check_apart([output, state, output.with_suffix(".png")], [*paths, *kept])
     if output.exists() and not state.exists() and not arguments.overwrite:
-        print(f"{output} kept as it is; --overwrite replaces it")
+        print(kept(output))
         return 0
     make_folder(output)
     if arguments.overwrite:
@@ -90,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         report=_report,
     )
     _write(output, result, settings, paths)
-    print(f"best: step {result.best.step}{_decibels(result.best)} -> {output}")
+    print(f"best: step {result.best.step}{_decibels(result.best)} -> {printable(output)}")
     if result.stopped:
         print("stopped; the same command goes on from here", flush=True)
         raise KeyboardInterrupt

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -57,12 +58,16 @@ def prepared(path: Path, folder: Path) -> np.ndarray:
     Raises `ValueError` for a frame that lacks a layer or is too small.
     """
     size, time = path.stat().st_size, path.stat().st_mtime_ns
-    key = hashlib.sha256(f"{VERSION} {path.resolve()} {size} {time}".encode())
+    key = hashlib.sha256(os.fsencode(f"{VERSION} {path.resolve()} {size} {time}"))
     kept = folder / f"{path.stem}-{key.hexdigest()[:12]}.npy"
     if not kept.exists():
+        frame, light = layers(path)
+        if min(frame.depth.shape[:2]) < CROP:
+            raise ValueError(f"{path}: training needs {CROP} x {CROP} pixels at least")
         folder.mkdir(parents=True, exist_ok=True)
+        record = _record(frame, light, np.random.default_rng([*os.fsencode(path.name)]))
         with replacing(kept) as beside, beside.open("wb") as file:
-            np.save(file, _record(*layers(path), np.random.default_rng([*path.name.encode()])))
+            np.save(file, record)
     return np.load(kept, mmap_mode="r")
 
 
@@ -107,9 +112,6 @@ def realisations(
 def _record(
     frame: Frame, light: dict[int, list[np.ndarray]], random: np.random.Generator
 ) -> np.ndarray:
-    height, width = frame.depth.shape[:2]
-    if min(height, width) < CROP:
-        raise ValueError(f"a frame of {width} x {height}; training needs {CROP} x {CROP} at least")
     albedo, target = np.asarray(frame.albedo), np.asarray(frame.reference)
     scale = exposure(albedo * target)
     wanted = display(albedo * target, scale)
@@ -199,4 +201,4 @@ def draw(record: np.ndarray, random: np.random.Generator) -> Example:
 def digest(paths: Sequence[Path]) -> str:
     """SHA-256 over names and sizes of the files, in order: what was trained on."""
     text = "\n".join(f"{path.name} {path.stat().st_size}" for path in paths)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(os.fsencode(text)).hexdigest()

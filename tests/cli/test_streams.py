@@ -1,5 +1,6 @@
 """What is around a command: terminals, closed streams, interruptions, other files."""
 
+import json
 import os
 import signal
 import subprocess
@@ -51,6 +52,51 @@ def test_names_that_the_terminal_has_no_letters_for(frame_file: Path, name: byte
     done = shell(line, folder, PYTHONIOENCODING="cp1252", PYTHONUTF8="0")
     assert done.returncode == 0, done.stderr
     assert len(list((folder / "out").iterdir())) == 4
+
+
+# Not UTF-8, what a terminal obeys, what HTML and JSON quote, what a line ends with.
+NAMES = [b"caf\xe9", b"red\x1b[31m", b"\"'<b>&amp;", b"a\nb", b"two  spaces"]
+
+
+@pytest.mark.parametrize("name", [*map(os.fsdecode, NAMES)], ids=ascii)
+def test_any_name_of_a_file(frame_file: Path, name: str, capsys: pytest.CaptureFixture) -> None:
+    folder = frame_file.with_name(name)
+    folder.mkdir()
+    frame, damaged = folder / f"{name}.exr", folder / f"other {name}.exr"
+    os.link(frame_file, frame)
+    damaged.write_bytes(b"v/1\x01 no more")
+    clean, page = frame_file.with_name(f"{name}.exr"), frame_file.with_name(f"{name}.html")
+    denoise = ["denoise", str(frame), "--backend", "opencl", "-o", str(clean)]
+
+    def said(*words: object) -> str:
+        assert main([str(word) for word in words]) == 0
+        output = capsys.readouterr()
+        assert output.out and not output.err
+        return output.out
+
+    assert json.loads(said(*denoise, "--json"))[0]["output"] == str(clean)
+    assert json.loads(said("info", frame, "--json"))["file"] == str(frame)
+    said(*denoise, "--overwrite", "--map", f"albedo={name}.exr:albedo")
+    lines = [said(*denoise), said("info", frame), said("metrics", clean, frame)]
+    lines.append(said("report", frame, clean, "-o", page))
+    assert all(line.isprintable() for text in lines for line in text.split("\n"))
+    assert b"<b>" not in page.read_bytes()
+
+    for words in (
+        ("info", damaged),
+        ("metrics", damaged),
+        ("report", frame, damaged, "-o", folder / "page"),
+        ("fit", damaged, "-o", folder / "fitted"),
+        ("train", "--data", damaged, "-o", folder / "weights"),
+        ("denoise", damaged, "-o", folder / "out"),
+        ("denoise", frame, "-o", folder / "out", "--params", damaged),
+        ("denoise", frame, "-o", folder / "out", "--temporal", "--history", damaged),
+    ):
+        assert main([str(word) for word in words]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and error[:-1].isprintable()
+        # Once, and so that the name can be told from others.
+        assert error.count(ascii(f"other {name}")[1:-1].replace("\\'", "'")) == 1
 
 
 def test_the_longest_names_can_be_written(tmp_path: Path, frame_file: Path) -> None:
