@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from jflnr.cli.common import kept, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
+from jflnr.files import replacing
 
 if TYPE_CHECKING:
     from jflnr.network.train import Progress, Result, Settings
@@ -146,4 +147,5 @@ def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence
     psnr.plot(steps, [entry.score for entry in result.history])
     loss.set(ylabel="training loss")
     psnr.set(ylabel="validation PSNR, dB", xlabel="steps")
-    figure.savefig(output.with_suffix(".png"))
+    with replacing(output.with_suffix(".png")) as beside:
+        figure.savefig(beside)
