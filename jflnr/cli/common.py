@@ -29,7 +29,7 @@ def printable(text: object) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in str(text))
 
 
-def kept(*paths: str | Path) -> str:
+def kept_as_it_is(*paths: str | Path) -> str:
     """What is said of outputs that are there."""
     return f"{' and '.join(map(printable, paths))} kept as it is; --overwrite replaces it"
 

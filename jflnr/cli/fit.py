@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jflnr.cli.common import guide_names, kept, printable
+from jflnr.cli.common import guide_names, kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     files = expand(arguments.frames)
     check_apart([arguments.output], files)
     if arguments.output.exists() and not arguments.overwrite:
-        print(kept(arguments.output))
+        print(kept_as_it_is(arguments.output))
         return 0
     frames = [_read(file, spp) for file in files for spp in arguments.spp]
     guides = choose(frames[0], arguments.guides)

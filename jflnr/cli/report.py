@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr.cli.common import kept, printable
+    from jflnr.cli.common import kept_as_it_is, printable
     from jflnr.cli.jobs import check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import collect
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths = expand(arguments.inputs)
     check_apart([output], [*paths, arguments.reference])
     if output.exists() and not arguments.overwrite:
-        print(kept(output))
+        print(kept_as_it_is(output))
         return 0
     scenes = collect(paths, arguments.spp, arguments.reference)
     make_folder(output)

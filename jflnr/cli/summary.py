@@ -3,7 +3,7 @@
 import sys
 from typing import Any
 
-from jflnr.cli.common import kept, metrics_table, printable, profile_table, tinted
+from jflnr.cli.common import kept_as_it_is, metrics_table, printable, profile_table, tinted
 
 
 def remarks(record: dict[str, Any], quiet: bool) -> list[str]:
@@ -26,11 +26,12 @@ def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: fl
 def summary(record: dict[str, Any], verbose: bool) -> str:
     """Lines for stdout."""
     if record["status"] == "kept":
-        return kept(*record["kept"])
+        return kept_as_it_is(*record["kept"])
     source = record["layout"] if record["spp"] is None else f"{record['spp']} spp"
     text = (
         f"{printable(record['input'])} -> {printable(record['output'])}  "
-        f"{record['width']} x {record['height']}, {source}, {record['method']}, {record['seconds']:.2f} s"
+        f"{record['width']} x {record['height']}, {source}, {record['method']}, "
+        f"{record['seconds']:.2f} s"
     )
     if record["compile_seconds"]:
         text += f" (and {record['compile_seconds']:.1f} s to compile)"

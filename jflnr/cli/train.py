@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jflnr.cli.common import kept, printable
+from jflnr.cli.common import kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
 from jflnr.files import replacing
 
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths, kept = expand(arguments.data), expand(arguments.val)
     check_apart([output, state, output.with_suffix(".png")], [*paths, *kept])
     if output.exists() and not state.exists() and not arguments.overwrite:
-        print(kept(output))
+        print(kept_as_it_is(output))
         return 0
     make_folder(output)
     if arguments.overwrite:
