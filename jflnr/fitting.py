@@ -136,8 +136,8 @@ def _plain(method: FLR, frame: Frame, names: tuple[str, ...]) -> Example:
 def smape(picture: jax.Array, reference: jax.Array) -> jax.Array:
     """Mean of |x - y| / (|x| + |y|), differentiable where both are 0."""
     # Its square must not vanish where the reference is black, or the derivative there is 0/0.
-    floor = jnp.maximum(1e-3 * jnp.mean(reference), 1e-12)
-    return jnp.mean(jnp.abs(picture - reference) / (jnp.abs(picture) + reference + floor))
+    epsilon = jnp.maximum(1e-3 * jnp.mean(reference), 1e-12)
+    return jnp.mean(jnp.abs(picture - reference) / (jnp.abs(picture) + reference + epsilon))
 
 
 def _loss(method: FLR, logarithms: Sequence[jax.Array], example: Example) -> jax.Array:

@@ -120,8 +120,8 @@ def flip_map(picture: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
 
 def relative_mse(picture: np.ndarray, reference: np.ndarray) -> float:
     """Relative mean squared error: mean of (x - y)^2 / (y^2 + 0.01 mean(y)^2)."""
-    floor = RELATIVE_EPSILON * np.mean(reference) ** 2
-    return _mean_ratio((picture - reference) ** 2, reference**2 + floor)
+    epsilon = RELATIVE_EPSILON * np.mean(reference) ** 2
+    return _mean_ratio((picture - reference) ** 2, reference**2 + epsilon)
 
 
 def smape(picture: np.ndarray, reference: np.ndarray) -> float:

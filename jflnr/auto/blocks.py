@@ -1,7 +1,7 @@
 """The cheap form: one pass over the pixels, and on blocks a model no larger than each one needs.
 
 The moments of the frame are collected once. Everything else happens on blocks: weights from a first
-fit, a pyramid of window widths, on every grid the average of all orders of model (`nested.py`), and
+fit, a pyramid of windows, on every grid the average of all orders of model (`nested.py`), and
 from each finer grid as much of the difference as is signal. On the finest grid the models are first
 only shifted; whole ones can follow, when it is known whether they are worth their time.
 docs/select.md derives the steps.

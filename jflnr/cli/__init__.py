@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from jflnr import __version__
 from jflnr.cli import completion, denoise, devices, fit, info, metrics, report, train
-from jflnr.cli.common import INPUT_ERRORS, sentence, tinted
+from jflnr.cli.common import INPUT_ERRORS, printable, sentence, tinted
 
 EXAMPLES = """\
   jflnr info render.exr                       what is in it, and what would be denoised
@@ -74,8 +74,7 @@ class _Parser(argparse.ArgumentParser):
     """An ArgumentParser that answers a wrong command line with one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        line = " ".join(message.split())
-        self.exit(2, f"{self.prog}: {line} (see {self.prog} --help)\n")
+        self.exit(2, f"{self.prog}: {printable(message)} (see {self.prog} --help)\n")
 
 
 def parser() -> argparse.ArgumentParser:

@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, TextIO
 
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
@@ -19,8 +20,18 @@ def sentence(error: BaseException) -> str:
     """The message of an input error, as one line."""
     if isinstance(error, OSError) and error.strerror:
         named = "" if error.filename is None else f"{error.filename}: "
-        return f"{named}{error.strerror.lower()}"
-    return " ".join(str(error).split()) or type(error).__name__
+        return printable(f"{named}{error.strerror.lower()}")
+    return printable(str(error).strip()) or type(error).__name__
+
+
+def printable(text: object) -> str:
+    """`text` in one line, with what a terminal would obey in names of files and layers escaped."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in str(text))
+
+
+def kept_as_it_is(*paths: str | Path) -> str:
+    """What is said of outputs that are there."""
+    return f"{' and '.join(map(printable, paths))} kept as it is; --overwrite replaces it"
 
 
 @contextlib.contextmanager
@@ -80,6 +91,7 @@ def _finite(value: Any) -> Any:
 
 def table(rows: Sequence[Sequence[str]], left: int = 1) -> str:
     """Rows of cells as aligned columns, the first `left` of them to the left."""
+    rows = [[*map(printable, row)] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(

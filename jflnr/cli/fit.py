@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jflnr.cli.common import guide_names
+from jflnr.cli.common import guide_names, kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     files = expand(arguments.frames)
     check_apart([arguments.output], files)
     if arguments.output.exists() and not arguments.overwrite:
-        print(f"{arguments.output} kept as it is; --overwrite replaces it")
+        print(kept_as_it_is(arguments.output))
         return 0
     frames = [_read(file, spp) for file in files for spp in arguments.spp]
     guides = choose(frames[0], arguments.guides)
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     numbers = ", ".join(f"{name} {n:.4g}" for name, n in numbers_of(result.method).items())
     print(
         f"{error} {result.before:.5f} before, {result.after:.5f} after, steps: {result.steps}\n"
-        f"{numbers} -> {arguments.output}"
+        f"{numbers} -> {printable(arguments.output)}"
     )
     return 0
 

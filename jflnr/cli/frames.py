@@ -16,7 +16,7 @@ import numpy as np
 
 import jflnr
 from jflnr import layouts
-from jflnr.cli.common import INPUT_ERRORS, sentence
+from jflnr.cli.common import INPUT_ERRORS, printable, sentence
 from jflnr.cli.content import (
     Pixels,
     Result,
@@ -273,8 +273,8 @@ def _compiling_is_told(denoiser: "jflnr.Denoiser", quiet: bool) -> Iterator[None
 def failure(job: Job, error: BaseException) -> Record:
     """The record of a frame that failed."""
     text = sentence(error)
-    named = any(str(path) in text for path in (job.source, job.target, job.preview))
-    text = text if named else f"{job.source}: {text}"
+    named = any(printable(path) in text for path in (job.source, job.target, job.preview))
+    text = text if named else f"{printable(job.source)}: {text}"
     return _record(job) | {"status": "failed", "error": text}
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from jflnr import exr, layouts
-from jflnr.cli.common import add_map, table, to_json
+from jflnr.cli.common import add_map, printable, table, to_json
 from jflnr.methods import PICTURES, default_of
 
 EXAMPLES = """\
@@ -67,13 +67,13 @@ def as_text(facts: dict[str, Any]) -> str:
     parts = f"{facts['parts']} parts" if facts["parts"] > 1 else "1 part"
     return "\n".join(
         [
-            facts["file"],
+            printable(facts["file"]),
             f"{facts['width']} x {facts['height']} pixels from ({x}, {y}), "
             f"{facts['compression']} compression, {parts}",
             "",
             table(rows, left=3),
             "",
-            *_use_text(facts["denoiser"]),
+            *map(printable, _use_text(facts["denoiser"])),
         ]
     )
 

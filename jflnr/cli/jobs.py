@@ -3,6 +3,7 @@
 import math
 import os
 import re
+import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,11 +65,12 @@ def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
 
 
 def make_folder(target: Path) -> None:
-    """Make the folder that `target` goes to, so that a wrong one is known before any work."""
+    """Make the folder that `target` goes to, and see that it takes files, before any work."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=target.parent).close()
     except OSError as error:
-        raise OSError(f"{target} cannot be written: {error.filename}: {error.strerror}") from None
+        raise OSError(f"{target} cannot be written: {error.strerror}") from None
 
 
 def check_apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:

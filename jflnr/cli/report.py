@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from jflnr.cli.common import kept_as_it_is, printable
     from jflnr.cli.jobs import check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import collect
@@ -37,11 +38,11 @@ def run(arguments: argparse.Namespace) -> int:
     paths = expand(arguments.inputs)
     check_apart([output], [*paths, arguments.reference])
     if output.exists() and not arguments.overwrite:
-        print(f"{output} kept as it is; --overwrite replaces it")
+        print(kept_as_it_is(output))
         return 0
     scenes = collect(paths, arguments.spp, arguments.reference)
     make_folder(output)
     title = arguments.title or ", ".join(scene.name for scene in scenes)
     write_report(output, scenes, title)
-    print(f"{output} ({output.stat().st_size / 1e6:.1f} MB)")
+    print(f"{printable(output)} ({output.stat().st_size / 1e6:.1f} MB)")
     return 0

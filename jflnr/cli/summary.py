@@ -3,14 +3,14 @@
 import sys
 from typing import Any
 
-from jflnr.cli.common import metrics_table, profile_table, tinted
+from jflnr.cli.common import kept_as_it_is, metrics_table, printable, profile_table, tinted
 
 
 def remarks(record: dict[str, Any], quiet: bool) -> list[str]:
     """Lines for stderr."""
     warning = tinted("warning:", "yellow", sys.stderr)
     found = [] if quiet else record.get("warnings", ())
-    lines = [f"jflnr: {warning} {record['input']}: {text}" for text in found]
+    lines = [f"jflnr: {warning} {printable(record['input'])}: {printable(text)}" for text in found]
     if "error" in record:
         lines.append(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}")
     return lines
@@ -26,20 +26,22 @@ def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: fl
 def summary(record: dict[str, Any], verbose: bool) -> str:
     """Lines for stdout."""
     if record["status"] == "kept":
-        return f"{' and '.join(record['kept'])} kept as it is; --overwrite replaces it"
+        return kept_as_it_is(*record["kept"])
     source = record["layout"] if record["spp"] is None else f"{record['spp']} spp"
     text = (
-        f"{record['input']} -> {record['output']}  {record['width']} x {record['height']}, "
-        f"{source}, {record['method']}, {record['seconds']:.2f} s"
+        f"{printable(record['input'])} -> {printable(record['output'])}  "
+        f"{record['width']} x {record['height']}, {source}, {record['method']}, "
+        f"{record['seconds']:.2f} s"
     )
     if record["compile_seconds"]:
         text += f" (and {record['compile_seconds']:.1f} s to compile)"
     if verbose:
         guides = ", ".join(record["guides"]) or "none"
         lines = [f"layout: {record['layout']}", f"backend: {record['backend']}"]
-        text += "".join(f"\n  {line}" for line in [*lines, f"guides: {guides}", *record["notes"]])
+        lines += [f"guides: {guides}", *record["notes"]]
+        text += "".join(f"\n  {printable(line)}" for line in lines)
     if "plan" in record:
-        text += "".join(f"\n  {line}" for line in record["plan"])
+        text += "".join(f"\n  {printable(line)}" for line in record["plan"])
     if "metrics" in record:
         text += "\n" + metrics_table(record["metrics"])
     if "profile" in record:

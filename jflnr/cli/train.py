@@ -16,7 +16,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jflnr.cli.common import kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
+from jflnr.files import replacing
 
 if TYPE_CHECKING:
     from jflnr.network.train import Progress, Result, Settings
@@ -68,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths, kept = expand(arguments.data), expand(arguments.val)
     check_apart([output, state, output.with_suffix(".png")], [*paths, *kept])
     if output.exists() and not state.exists() and not arguments.overwrite:
-        print(f"{output} kept as it is; --overwrite replaces it")
+        print(kept_as_it_is(output))
         return 0
     make_folder(output)
     if arguments.overwrite:
@@ -95,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
         report=_report,
     )
     _write(output, result, settings, paths)
-    print(f"best: step {result.best.step}{_decibels(result.best)} -> {output}")
+    print(f"best: step {result.best.step}{_decibels(result.best)} -> {printable(output)}")
     if result.stopped:
         print("stopped; the same command goes on from here", flush=True)
         raise KeyboardInterrupt
@@ -151,4 +153,5 @@ def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence
     psnr.plot(steps, [entry.score for entry in result.history])
     loss.set(ylabel="training loss")
     psnr.set(ylabel="validation PSNR, dB", xlabel="steps")
-    figure.savefig(output.with_suffix(".png"))
+    with replacing(output.with_suffix(".png")) as beside:
+        figure.savefig(beside)

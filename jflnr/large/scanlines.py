@@ -5,6 +5,7 @@ OpenEXR's own Python module only knows whole files. Files of one part in scan li
 
 import dataclasses
 import functools
+import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,19 @@ def _openimageio() -> Any:
     return OpenImageIO
 
 
+def _opened(path: Path) -> Any:
+    """The open file; OpenImageIO takes no names that are not UTF-8."""
+    open_file = _openimageio().ImageInput.open
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            str(path).encode()
+        except UnicodeEncodeError:
+            link = Path(folder) / "link.exr"
+            link.symlink_to(path.resolve())
+            path = link
+        return open_file(str(path))
+
+
 class Scanlines:
     """An open file: its size, attributes and layout, and any rows of its channels.
 
@@ -45,7 +59,7 @@ class Scanlines:
 
     def __init__(self, path: Path, spp: int | None, names: Mapping[str, str]) -> None:
         self.path, self.attributes = path, exr.read_attributes(path)
-        self.file = _openimageio().ImageInput.open(str(path))
+        self.file = _opened(path)
         if self.file is None:
             raise ValueError(f"{path} cannot be read in parts: it is damaged")
         spec = self.file.spec()

@@ -10,7 +10,7 @@ import numpy as np
 from jflnr import checks, exr
 from jflnr.layouts.channels import LAYERS, PICTURE, Layout, in_layer, present
 
-FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE)
+FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE | re.DOTALL)
 
 BORROWED = "file://"  # how the names of another file's channels start
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -57,13 +58,19 @@ def prepared(path: Path, folder: Path, method: Any = DEFAULT) -> np.ndarray:
     Raises `ValueError` for a frame that lacks a layer or is too small.
     """
     size, time = path.stat().st_size, path.stat().st_mtime_ns
-    key = hashlib.sha256(f"{VERSION} {method.read.LAYER} {path.resolve()} {size} {time}".encode())
+    key = hashlib.sha256(
+        os.fsencode(f"{VERSION} {method.read.LAYER} {path.resolve()} {size} {time}")
+    )
     kept = folder / f"{path.stem}-{key.hexdigest()[:12]}.npy"
     if not kept.exists():
+        noisy = Noisy.of(path, method)
+        target = noisy.target()
+        if min(target.shape[:2]) < CROP:
+            raise ValueError(f"{path}: training needs {CROP} x {CROP} pixels at least")
         folder.mkdir(parents=True, exist_ok=True)
-        noisy, random = Noisy.of(path, method), np.random.default_rng([*path.name.encode()])
+        record = _record(noisy, target, np.random.default_rng([*os.fsencode(path.name)]))
         with replacing(kept) as beside, beside.open("wb") as file:
-            np.save(file, _record(noisy, random))
+            np.save(file, record)
     return np.load(kept, mmap_mode="r")
 
 
@@ -108,16 +115,18 @@ class Noisy:
 
     def target(self) -> np.ndarray:
         """What the light should be, `(H, W, 3)`. Raises `ValueError` if nothing says so."""
-        layer = next((name for name in ("target", "reference") if f"{name}.R" in self.fixed), None)
-        if layer is None:
-            raise ValueError(f"{self.path}: needs a layer reference")
-        return np.stack([self.fixed[f"{layer}.{c}"] for c in "RGB"], -1).astype(np.float32)
+        return self._layer("target" if "target.R" in self.fixed else "reference")
 
     def albedo(self) -> np.ndarray:
         """What the light is to be multiplied by to be shown, `(H, W, 3)`, or 1 for pictures."""
         if self.method.read.LAYER == "beauty":
             return np.ones((1, 1, 3), np.float32)
-        return np.stack([self.fixed[f"albedo.{c}"] for c in "RGB"], -1).astype(np.float32)
+        return self._layer("albedo")
+
+    def _layer(self, name: str) -> np.ndarray:
+        if f"{name}.R" not in self.fixed:
+            raise ValueError(f"{self.path}: needs a layer {name}")
+        return np.stack([self.fixed[f"{name}.{c}"] for c in "RGB"], -1).astype(np.float32)
 
     def realisations(self, random: np.random.Generator) -> Iterator[tuple[int, Frame]]:
         """Samples per pixel, and the frame with a noisy layer, their means, and mixtures.
@@ -146,12 +155,8 @@ class Noisy:
                     yield spp, self.frame(spp, mixed)
 
 
-def _record(noisy: Noisy, random: np.random.Generator) -> np.ndarray:
-    read, target = noisy.method.read, noisy.target()
-    height, width = target.shape[:2]
-    if min(height, width) < CROP:
-        raise ValueError(f"a frame of {width} x {height}; training needs {CROP} x {CROP} at least")
-    albedo = noisy.albedo()
+def _record(noisy: Noisy, target: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    read, albedo = noisy.method.read, noisy.albedo()
     scale = exposure(albedo * target)
     wanted = display(albedo * target, scale)
     fields: dict[str, list[Any]] = {name: [] for name in (*read.OF_NOISE, "spp", "exposure")}
@@ -244,4 +249,4 @@ def draw(method: Any, record: np.ndarray, random: np.random.Generator) -> Exampl
 def digest(paths: Sequence[Path]) -> str:
     """SHA-256 over names and sizes of the files, in order: what was trained on."""
     text = "\n".join(f"{path.name} {path.stat().st_size}" for path in paths)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(os.fsencode(text)).hexdigest()

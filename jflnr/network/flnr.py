@@ -44,10 +44,11 @@ def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
     if parts["weight"] is not None:
         usable &= parts["weight"] > 0
     usable = usable[..., None]
-    unit = known["mean"] * known["unit"]
 
     def shown(image: jax.Array) -> jax.Array:
-        return jnp.where(usable, jnp.clip(image / unit, 0, features.BRIGHTEST), 0)
+        # The bound parts two divisions, whose divisors' product may be less than any number.
+        bounded = jnp.clip(image / known["unit"], 0, features.BRIGHTEST * known["mean"])
+        return jnp.where(usable, bounded / known["mean"], 0)
 
     groups = (*target.shape[:2], target.shape[2] // COLOURS, COLOURS)
     light, noisy = (x.reshape(groups).sum(2) for x in (parts["fitted"], target))
@@ -57,7 +58,7 @@ def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
     mask = usable.astype(light.dtype)
     images = shown(light), shown(noisy), shown(parts["noise"])
     guides = guides[..., :3], guides[..., 3:4], ao.astype(mask.dtype)
-    return features.Read(*images, *guides, mask), unit
+    return features.Read(*images, *guides, mask), known["mean"] * known["unit"]
 
 
 @pytree

@@ -1,4 +1,4 @@
-"""FLR that adapts to the noise and to edges: weights, windows and widths from the data.
+"""FLR that adapts to the noise and to edges: weights and windows from the data.
 
 Pass 1 over the pixels collects moments of the brightness; a first fit, the pilot, comes from them.
 Pass 2 weighs every pixel by the variance that the pilot predicts and collects the moments of all

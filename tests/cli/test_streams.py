@@ -1,10 +1,16 @@
 """What is around a command: terminals, closed streams, interruptions, other files."""
 
+import errno
+import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
@@ -53,6 +59,51 @@ def test_names_that_the_terminal_has_no_letters_for(frame_file: Path, name: byte
     assert len(list((folder / "out").iterdir())) == 4
 
 
+# Not UTF-8, what a terminal obeys, what HTML and JSON quote, what a line ends with.
+NAMES = [b"caf\xe9", b"red\x1b[31m", b"\"'<b>&amp;", b"a\nb", b"two  spaces"]
+
+
+@pytest.mark.parametrize("name", [*map(os.fsdecode, NAMES)], ids=ascii)
+def test_any_name_of_a_file(frame_file: Path, name: str, capsys: pytest.CaptureFixture) -> None:
+    folder = frame_file.with_name(name)
+    folder.mkdir()
+    frame, damaged = folder / f"{name}.exr", folder / f"other {name}.exr"
+    os.link(frame_file, frame)
+    damaged.write_bytes(b"v/1\x01 no more")
+    clean, page = frame_file.with_name(f"{name}.exr"), frame_file.with_name(f"{name}.html")
+    denoise = ["denoise", str(frame), "--backend", "opencl", "-o", str(clean)]
+
+    def said(*words: object) -> str:
+        assert main([str(word) for word in words]) == 0
+        output = capsys.readouterr()
+        assert output.out and not output.err
+        return output.out
+
+    assert json.loads(said(*denoise, "--json"))[0]["output"] == str(clean)
+    assert json.loads(said("info", frame, "--json"))["file"] == str(frame)
+    said(*denoise, "--overwrite", "--map", f"albedo={name}.exr:albedo")
+    lines = [said(*denoise), said("info", frame), said("metrics", clean, frame)]
+    lines.append(said("report", frame, clean, "-o", page))
+    assert all(line.isprintable() for text in lines for line in text.split("\n"))
+    assert b"<b>" not in page.read_bytes()
+
+    for words in (
+        ("info", damaged),
+        ("metrics", damaged),
+        ("report", frame, damaged, "-o", folder / "page"),
+        ("fit", damaged, "-o", folder / "fitted"),
+        ("train", "--data", damaged, "-o", folder / "weights"),
+        ("denoise", damaged, "-o", folder / "out"),
+        ("denoise", frame, "-o", folder / "out", "--params", damaged),
+        ("denoise", frame, "-o", folder / "out", "--temporal", "--history", damaged),
+    ):
+        assert main([str(word) for word in words]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and error[:-1].isprintable()
+        # Once, and so that the name can be told from others.
+        assert error.count(ascii(f"other {name}")[1:-1].replace("\\'", "'")) == 1
+
+
 def test_the_longest_names_can_be_written(tmp_path: Path, frame_file: Path) -> None:
     name = "ü" * 125 + ".exr"
     for start in (name, "n" * 251 + ".exr", "a", ".exr"):
@@ -79,6 +130,110 @@ def test_a_full_disk_names_the_file(tmp_path: Path) -> None:
         beside.write_bytes(b"x")
     with pytest.raises(OSError, match=r"^[^ ]*/gone/out\.npz cannot be written: No such"):
         replacing(tmp_path / "gone" / "out.npz").__enter__()
+
+
+def refuse(number: int) -> NoReturn:
+    raise OSError(number, os.strerror(number))
+
+
+def read_only(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As for others than root: no file can be made in `out`, nor anything replaced there."""
+    opened = os.open
+    makes = os.O_CREAT | getattr(os, "O_TMPFILE", 0)
+    monkeypatch.setattr(
+        os,
+        "open",
+        lambda path, flags, *others, **named: (
+            refuse(errno.EROFS)
+            if flags & makes and folder in Path(os.fsdecode(path)).parents
+            else opened(path, flags, *others, **named)
+        ),
+    )
+
+
+def vanished(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = tempfile.mkstemp
+
+    def gone(**named: Any) -> Any:
+        shutil.rmtree(folder)
+        return made(**named)
+
+    monkeypatch.setattr(tempfile, "mkstemp", gone)
+
+
+def full(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = tempfile.mkstemp
+
+    def small(**named: Any) -> Any:
+        handle, name = made(**named)
+        if folder.samefile(named["dir"]):
+            os.remove(name)
+            os.symlink("/dev/full", name)
+        return handle, name
+
+    monkeypatch.setattr(tempfile, "mkstemp", small)
+
+
+def fixed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is there may not be replaced."""
+    put = os.replace
+    monkeypatch.setattr(
+        os,
+        "replace",
+        lambda path, target: (
+            refuse(errno.EPERM) if folder.samefile(target.parent) else put(path, target)
+        ),
+    )
+
+
+def below_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder.rmdir()
+    folder.write_bytes(b"")
+
+
+@pytest.mark.parametrize("fault", [read_only, vanished, full, fixed, below_a_file])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "denoise frame.exr --backend opencl -o out/named.exr",
+        "denoise frame.exr --temporal --method flr -o clean/ --history out/named.npz",
+        "report frame.exr -o out/named.html",
+        "fit frame.exr --steps 1 -o out/named.json",
+        "train --data frame.exr -o out/named.npz",
+    ],
+)
+def test_what_cannot_be_written(
+    frame_file: Path,
+    line: str,
+    fault: Callable[[Path, pytest.MonkeyPatch], None],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    if line.startswith("train"):
+        trained(monkeypatch)
+    monkeypatch.chdir(frame_file.parent)
+    out = frame_file.with_name("out")
+    out.mkdir()
+    with monkeypatch.context() as patch:
+        fault(out, patch)
+        assert main(line.split()) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"out/{line.rpartition('/')[2]} cannot be written" in said
+    left = {path for path in frame_file.parent.rglob("*") if path.is_file()}
+    assert left <= {frame_file, out, frame_file.parent / "clean" / "frame.exr"}
+
+
+def trained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Training without its hour."""
+    import jax
+
+    from jflnr.network import examples, flnr, train
+
+    params = flnr.init(jax.random.key(0), train.SIZES["base"])
+    progress = train.Progress(1, 1.0, 1.0, {})
+    result = train.Result(params, progress, [progress], False)
+    monkeypatch.setattr(examples, "prepared", lambda *_: None)
+    monkeypatch.setattr(train, "train", lambda *_, **__: result)
 
 
 @pytest.mark.parametrize("name", ["pipe", "loop", "/dev/zero"])
