@@ -16,7 +16,7 @@ from jflnr import checks
 from jflnr.frame import Array, Frame
 from jflnr.images.inputs import prepare
 from jflnr.lazy import check_not_forked, jax
-from jflnr.methods import BACKENDS, DEFAULT, backend_for, default_of, method_of
+from jflnr.methods import AUTO, BACKENDS, DEFAULT, default_of, method_of
 from jflnr.regression.arguments import block_for
 from jflnr.stages import Parts, on_frame
 
@@ -100,6 +100,26 @@ def denoise(
     the frame has no ambient occlusion.
     """
     return Denoiser(method, backend=backend, guides=guides, tile=tile, **options)(frame)
+
+
+def backend_for(backend: str, method: Any, tile: int | None = None) -> str:
+    """What runs a method: `backend`, or, if that is `auto`, OpenCL where it can, else JAX.
+
+    It can where there is a device, kernels of the method (all that denoise by default have some)
+    and no tiles.
+    """
+    checks.choice("backend", backend, (*BACKENDS, AUTO))
+    if backend != AUTO:
+        return backend
+    if tile is not None or "opencl" not in getattr(method, "backends", BACKENDS):
+        return "jax"
+    from jflnr.opencl.devices import NoDevice, all_devices
+
+    try:
+        all_devices()
+    except NoDevice:
+        return "jax"
+    return "opencl"
 
 
 class Denoiser:

@@ -48,26 +48,6 @@ def default_of(frame: Any) -> str:
     return DEFAULT if frame.beauty is None else WHOLE
 
 
-def backend_for(backend: str, method: Any, tile: int | None = None) -> str:
-    """What runs a method: `backend`, or, if that is `auto`, OpenCL where it can, else JAX.
-
-    It can where there is a device, kernels of the method (all that denoise by default have some)
-    and no tiles.
-    """
-    checks.choice("backend", backend, (*BACKENDS, AUTO))
-    if backend != AUTO:
-        return backend
-    if tile is not None or "opencl" not in getattr(method, "backends", BACKENDS):
-        return "jax"
-    from jflnr.opencl.devices import NoDevice, all_devices
-
-    try:
-        all_devices()
-    except NoDevice:
-        return "jax"
-    return "opencl"
-
-
 def method_of(method: Any = DEFAULT, **options: Any) -> Any:
     """The method that is meant: one by name or an object, with some of its fields replaced.
 

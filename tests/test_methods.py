@@ -15,9 +15,10 @@ import pytest
 import jflnr
 from jflnr import exr, methods, temporal
 from jflnr.cli import main
+from jflnr.denoising import backend_for
 from jflnr.frame import Frame
 from jflnr.images.inputs import plain_images
-from jflnr.methods import backend_for, method_of
+from jflnr.methods import method_of
 from jflnr.opencl import devices
 from jflnr.opencl import temporal as on_device
 from jflnr.regression.apply import apply
