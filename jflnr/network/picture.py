@@ -94,11 +94,11 @@ class Read(NamedTuple):
     def corrected(self, gains: jax.Array) -> jax.Array:
         """The picture by what the network says of it, `(H, W, 3)` both.
 
-        What is dark may brighten where something covers it; all is as bright as its `own` light.
-        The less covers a pixel, the less is changed.
+        What is dark may brighten where something covers it. The less covers a pixel, the less is
+        changed.
         """
         dark, gains = DARK * self.alpha, 1 + self.alpha**2 * (gains - 1)
-        return jnp.maximum((self.light + dark) * gains - dark, self.own)
+        return jnp.maximum((self.light + dark) * gains - dark, 0)
 
 
 def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
@@ -198,8 +198,7 @@ def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
     image = known.get("corrected", corrected)(method.params, read) * unit
     fitted = parts["fitted"]
     xp: Any = fitted.__array_namespace__()
-    # What is emitted, to the bit: nothing is left of it for the light passes.
-    image = xp.where(xp.isfinite(fitted), xp.maximum(image, parts["own"]), fitted)
+    image = xp.where(xp.isfinite(fitted), image, fitted)
     return finished(method, image, parts | {"error": parts["noise"]})
 
 

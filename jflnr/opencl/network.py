@@ -81,8 +81,7 @@ def correct_picture(context: Context, params: unet.Params, read: picture.Read) -
     _, said = _said(context, params, size, picture.Read.PIXEL, defines, images)
     result = np.empty(read.light.shape, np.float32)
     output = context.array(result, writable=True) if context.on_cpu else context.empty(result.shape)
-    others = named["own"], named["alpha"]
-    _write(context, said, others, named["light"], output, {"PICTURE": 1} | DARK)
+    _write(context, said, (named["alpha"],), named["light"], output, {"PICTURE": 1} | DARK)
     return context.finish(output, result)
 
 

@@ -242,10 +242,14 @@ def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
     xp: Any = image.__array_namespace__()
     given = {"image": image if alpha is None else xp.concatenate([image, alpha], axis=-1)}
     if method.lobes:
-        emitted, environment = parts["emitted"], parts["environment"]
         images = parts["lobes"], parts["colours"], parts["guides"][:LOBE_GUIDES], parts["weight"]
-        noisy = parts["target"] * parts["surface"]
-        passes, left = split(image - parts["own"], noisy, *images)
+        noisy, own = parts["target"] * parts["surface"], parts["own"]
+        # What is emitted is no brighter than the picture.
+        share = xp.minimum(image / xp.where(own > 0, own, 1), 1)
+        share = xp.where(own > 0, share, 1)
+        emitted = share * parts["emitted"]
+        environment = parts["environment"] * (share if alpha is None else 1)
+        passes, left = split(xp.maximum(image - share * own, 0), noisy, *images)
         planes = [passes, parts["colours"][1], emitted + left, environment]
         given["passes"] = xp.concatenate(planes, axis=-1)
     if method.with_error:

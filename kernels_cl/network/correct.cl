@@ -30,13 +30,13 @@ INLINE real factor(real said)
 }
 
 #ifdef PICTURE
-#define OTHERS global const float *own, global const float *alpha
+#define OTHERS global const float *alpha
 #else
 #define OTHERS global const float *read
 #endif
 
 // said: a map of 12 channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as wide.
-// light, own, output: (H, W, C) in float, alpha: (H, W). Global size ((pitch - MARGIN) / WIDTH, h).
+// light, output: (H, W, C) in float, alpha: (H, W). Global size ((pitch - MARGIN) / WIDTH, h).
 kernel void correct(
     int width, int height, int h, int w, int pitch, global const float *said, OTHERS,
     global const float *light, global float *output)
@@ -74,9 +74,8 @@ kernel void correct(
                 const real before = guide_lanes(light + pixel * C, C, c, 0, last);
 #ifdef PICTURE
                 const real cover = guide_lanes(alpha + pixel, 1, 0, 0, last), dark = DARK * cover;
-                const real least = guide_lanes(own + pixel * C, C, c, 0, last);
                 const real part = 1 + cover * cover * (gain - 1);
-                values[c] = MAX((before + dark) * part - dark, least);
+                values[c] = MAX((before + dark) * part - dark, 0);
 #else
                 values[c] = gain * before;
 #endif

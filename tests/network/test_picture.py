@@ -130,6 +130,20 @@ def test_over_time_it_corrects_the_averages():
     assert np.abs(alone - picture).max() > 0.1
 
 
+def test_light_passes_sum_to_what_it_makes(corrected):
+    """Also where it takes light from a lamp; none is negative."""
+    frame, _ = corrected
+    lamp = np.float32(0.3 * frame.alpha * (np.arange(WIDTH) < 23)[:, None] * [1, 1, 1])
+    passes = {"lobes": np.concatenate([frame.beauty, 0 * frame.beauty], axis=-1)}
+    passes |= {"lobe_colours": np.ones_like(frame.beauty), "emitted": lamp}
+    passes |= {"beauty": frame.beauty + lamp, "alpha": None}
+    picture, told = jflnr.denoise(dataclasses.replace(frame, **passes), method(lobes=True))
+    direct, indirect, colour, emitted, environment = np.split(told, 5, axis=-1)
+    assert np.all(told >= 0) and np.any(emitted < 0.9 * lamp)
+    total = (direct + indirect) * colour + emitted + environment
+    np.testing.assert_allclose(total, picture, atol=1e-5 * picture.max())
+
+
 @pytest.mark.parametrize("on_cpu", [True, False], ids=["cpu", "gpu_like"])
 @pytest.mark.parametrize("size", [(21, 37), (40, 64)])
 def test_its_kernels_are_its_twin(size, on_cpu, monkeypatch):
