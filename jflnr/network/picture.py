@@ -33,6 +33,10 @@ from jflnr.regression.picture import (
 from jflnr.stages import Known, Parts, Stage
 
 
+# The network has seen no means of more.
+MOST_SAMPLES = 32
+
+
 class Read(NamedTuple):
     """The images that are read, `(H, W, 3)` or `(H, W, 1)`.
 
@@ -87,7 +91,7 @@ class Read(NamedTuple):
             2 * self.alpha - 1,
             jnp.minimum(luminance(self.own) / (light + DARK), 1),
             self.weight,
-            jnp.log2(jnp.maximum(self.samples, 1)) / 4,
+            jnp.log2(jnp.clip(self.samples, 1, MOST_SAMPLES)) / 4,
         ]
         return jnp.concatenate(planes, axis=-1)
 

@@ -78,6 +78,7 @@ def correct_picture(context: Context, params: unet.Params, read: picture.Read) -
     images = [context.array(np.require(image, np.float32, ["C", "ALIGNED"])) for image in read]
     named = dict(zip(read._fields, images, strict=True))
     size, defines = read.light.shape[:2], guide_defines((), 3) | {"PICTURE": 1}
+    defines["MOST_SAMPLES"] = picture.MOST_SAMPLES
     _, said = _said(context, params, size, picture.Read.PIXEL, defines, images)
     result = np.empty(read.light.shape, np.float32)
     output = context.array(result, writable=True) if context.on_cpu else context.empty(result.shape)

@@ -1,6 +1,8 @@
 // What the network reads of whole pictures (jflnr/network/picture.py): for features.cl.
 //
 // Images (H, W, 3) and (H, W), as in `picture.Read`.
+//
+// Define: MOST_SAMPLES, the most that a pixel is said to be a mean of.
 
 #define IMAGE_PARAMETERS                                                                       \
     global const float *light, global const float *noisy, global const float *error,           \
@@ -68,5 +70,5 @@ INLINE void of_pixels(
     values[24] = MIN(luminance(colour) / (before + DARK), 1);
     values[25] = take_one(weight, pixel, last);
     const real count = take_one(samples, pixel, last);
-    values[26] = 0.25f / M_LN2_F * log_above_0(MAX(count, 1));
+    values[26] = 0.25f / M_LN2_F * log_above_0(CLAMP(count, 1, MOST_SAMPLES));
 }

@@ -229,7 +229,7 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> None:
 
     from jflnr.network import examples, flnr, train
 
-    params = flnr.init(jax.random.key(0), train.SIZES["base"])
+    params = flnr.init(jax.random.key(0), train.WIDTHS["flnr"])
     progress = train.Progress(1, 1.0, 1.0, {})
     result = train.Result(params, progress, [progress], False)
     monkeypatch.setattr(examples, "prepared", lambda *_: None)
