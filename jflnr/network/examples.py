@@ -139,8 +139,8 @@ class Noisy:
         for spp, streams in self.streams.items():
             if (count := len(streams)) > 1:
                 renamed = lambda name, to=spp * count, spp=spp: name.replace(f"_{spp}.", f"_{to}.")
-                mean = {
-                    renamed(name): np.mean([s[name] for s in streams], axis=0, dtype=np.float32)
+                mean: Channels = {
+                    renamed(name): np.asarray(np.mean([s[name] for s in streams], 0), np.float32)
                     for name in streams[0]
                 }
                 found.setdefault(spp * count, []).append(mean)

@@ -27,13 +27,13 @@ class Read(NamedTuple):
 
     # How many values are read of a pixel, the guides of a frame that they come from, the noisy
     # layer of training frames, and the image that says where there is something.
-    PIXEL = 15
-    GUIDES = ("normal", "depth", "ao")
-    LAYER, COVER = "indirect", "mask"
+    PIXEL = 15  # type: ignore[misc]
+    GUIDES = ("normal", "depth", "ao")  # type: ignore[misc]
+    LAYER, COVER = "indirect", "mask"  # type: ignore[misc]
     # What changes with the noise, and the images that are colours, light, and directions.
-    OF_NOISE = ("light", "noisy", "error", "ao")
-    COLOURS = LIGHT = ("light", "noisy")
-    DIRECTIONS = ("normal",)
+    OF_NOISE = ("light", "noisy", "error", "ao")  # type: ignore[misc]
+    COLOURS = LIGHT = ("light", "noisy")  # type: ignore[misc]
+    DIRECTIONS = ("normal",)  # type: ignore[misc]
 
     light: Any
     noisy: Any

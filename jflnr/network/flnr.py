@@ -56,9 +56,9 @@ def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
     guides = jnp.where(usable, jnp.clip(guides, lowest, highest), 0)
     ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(usable, 1.0, 0.0)
     mask = usable.astype(light.dtype)
-    images = shown(light), shown(noisy), shown(parts["noise"])
-    guides = guides[..., :3], guides[..., 3:4], ao.astype(mask.dtype)
-    return features.Read(*images, *guides, mask), known["mean"] * known["unit"]
+    images = shown(light), shown(noisy), shown(parts["noise"]), guides[..., :3], guides[..., 3:4]
+    read = features.Read(*images, ao.astype(mask.dtype), mask)  # type: ignore[call-arg]
+    return read, known["mean"] * known["unit"]
 
 
 @pytree

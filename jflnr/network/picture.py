@@ -32,7 +32,6 @@ from jflnr.regression.picture import (
 )
 from jflnr.stages import Known, Parts, Stage
 
-
 # The network has seen no means of more.
 MOST_SAMPLES = 32
 
@@ -48,16 +47,16 @@ class Read(NamedTuple):
     """
 
     # As of `features.Read`.
-    PIXEL = 27
-    GUIDES = WholePicture.guides
-    LAYER, COVER = "beauty", "alpha"
-    OF_NOISE = (
+    PIXEL = 27  # type: ignore[misc]
+    GUIDES = WholePicture.guides  # type: ignore[misc]
+    LAYER, COVER = "beauty", "alpha"  # type: ignore[misc]
+    OF_NOISE = (  # type: ignore[misc]
         *("light", "noisy", "error", "own", "albedo", "albedo_left", "normal", "normal_left"),
         *("seen_normal", "depth", "alpha", "weight", "samples"),
     )
-    LIGHT = ("light", "noisy", "own")
-    COLOURS = (*LIGHT, "albedo", "albedo_left")
-    DIRECTIONS = ("normal", "seen_normal")
+    LIGHT = ("light", "noisy", "own")  # type: ignore[misc]
+    COLOURS = (*LIGHT, "albedo", "albedo_left")  # type: ignore[misc]
+    DIRECTIONS = ("normal", "seen_normal")  # type: ignore[misc]
 
     light: Any
     noisy: Any
@@ -148,8 +147,8 @@ class PictureFLNR(WholePicture):
         return True
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> PictureFLNR:
-        method = super().for_frame(frame, names)
-        return method.ready(len(self.guides), COLOURS)
+        super().for_frame(frame, names)
+        return self.ready(len(self.guides), COLOURS)
 
     def ready(self, guides: int, channels: int) -> PictureFLNR:
         """With the weights that ship, if it has none."""

@@ -66,5 +66,5 @@ def rescale(
     for before, after in scaled:
         strips = -(-before.size // defines["WIDTH"])
         half = {"HALF_OUTPUT": 1} if after.dtype == "float16" else {}
-        arguments = before.size, ratio, before, after
-        context.run("rescale", "rescale.cl", defines | half, (strips,), arguments)
+        of_image = before.size, ratio, before, after
+        context.run("rescale", "rescale.cl", defines | half, (strips,), of_image)

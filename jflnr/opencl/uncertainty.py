@@ -30,7 +30,7 @@ def standard_error(
             coarse.models.planes, share.planes, None if before is None else before.planes,
             after.planes,
         )  # fmt: skip
-        defines = {"FIRST": 1} if before is None else {}
+        defines: dict[str, Any] = {"FIRST": 1} if before is None else {}
         run.launch("error_step", "uncertainty.cl", after, arguments, **defines)
         before = after
     assert before is not None
