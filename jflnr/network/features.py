@@ -50,8 +50,7 @@ class Read(NamedTuple):
         planes = [
             jnp.log(light + DARK),
             jnp.clip(residual, -1, 4) / 2,
-            jnp.log1p((noisy + 0.05) / (light + 0.05)),
-            jnp.log(self.error / (light + 0.05) + 0.01) + 1.5,
+            *doubts(light, noisy, self.error),
             jnp.log((self.light + DARK) / (light + DARK)),
             self.normal,
             jnp.log(self.depth + 0.05),
@@ -70,6 +69,15 @@ class Read(NamedTuple):
 def luminance(light: jax.Array) -> jax.Array:
     """`(H, W, 3)` to `(H, W, 1)`."""
     return light @ jnp.asarray(LUMINANCE, light.dtype)[:, None]
+
+
+def doubts(light: jax.Array, noisy: jax.Array, error: jax.Array) -> list[jax.Array]:
+    """How much brighter the noisy light is than the denoised one, and how far that may be off.
+
+    All `(H, W, 1)`.
+    """
+    bright = light + 0.05
+    return [jnp.log1p((noisy + 0.05) / bright), jnp.log(error / bright + 0.01) + 1.5]
 
 
 def of_means(read: Any, scales: int) -> list[jax.Array]:

@@ -15,7 +15,7 @@ from jflnr.images.guides import Scene, scene_of
 from jflnr.images.noisy_guides import FILTERS, Filters
 from jflnr.lazy import jax, jit, jnp, pytree
 from jflnr.network import unet
-from jflnr.network.features import BRIGHTEST, DARK, luminance
+from jflnr.network.features import BRIGHTEST, DARK, doubts, luminance
 from jflnr.network.flnr import COLOURS, DEEPEST, gains
 from jflnr.regression.adaptive import light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
@@ -78,8 +78,7 @@ class Read(NamedTuple):
         planes = [
             jnp.log(self.light + DARK),
             jnp.clip((self.noisy - self.light) / (light + 0.05), -1, 4) / 2,
-            jnp.log1p((noisy + 0.05) / (light + 0.05)),
-            jnp.log(self.error / (light + 0.05) + 0.01) + 1.5,
+            *doubts(light, noisy, self.error),
             jnp.minimum(self.error, 3),
             2 * jnp.sqrt(self.albedo + 1e-4) - 1,
             2 * self.albedo_left,
