@@ -47,11 +47,13 @@ def _likeness(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
 
 
 class Filters(NamedTuple):
-    """What takes the noise from guides: `smooth_guide`, and `regression.features.average`, each of
-    JAX, None for the latter, or of a device."""
+    """What takes the noise from guides: `smooth_guide`, and `regression.picture.filter_layers`.
+
+    Each of JAX, for the latter None, or of a device.
+    """
 
     smooth: Callable[..., Any] = smooth_guide
-    average: Callable[..., Any] | None = None
+    layers: Callable[..., Any] | None = None
 
 
 FILTERS = Filters()

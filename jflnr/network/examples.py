@@ -30,7 +30,7 @@ LEAST_ERROR = 3e-4
 # A crop that shows little but sky teaches little.
 LEAST_SURFACE, TRIES = 0.3, 5
 # Change it when prepared frames become others.
-VERSION = 2
+VERSION = 3
 # A channel of a noisy layer: its samples per pixel, and which of several streams it is of.
 NOISY = re.compile(r"(\w+?)_(\d+)(_[a-z])?\.(\w+)")
 

@@ -20,7 +20,7 @@ from jflnr.network.flnr import COLOURS, DEEPEST, gains
 from jflnr.regression.adaptive import light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH
-from jflnr.regression.features import SAMPLES, average
+from jflnr.regression.features import SAMPLES
 from jflnr.regression.picture import (
     EVERYTHING,
     GUIDES,
@@ -28,6 +28,7 @@ from jflnr.regression.picture import (
     WholePicture,
     composed,
     finished,
+    own_light,
     picture_in,
 )
 from jflnr.stages import Known, Parts, Stage
@@ -116,7 +117,7 @@ def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
     def shown(image: Any) -> Any:
         return xp.clip(xp.nan_to_num(image / over), 0, BRIGHTEST)
 
-    noisy = parts["target"] * parts["surface"] + parts["own"]
+    noisy = parts["target"] * parts["surface"] + parts["noisy_own"]
     light = [shown(image) for image in (parts["fitted"], noisy, parts["noise"], parts["own"])]
     weight = parts["weight"][..., None]
     alpha = xp.ones_like(weight) if parts["alpha"] is None else xp.clip(parts["alpha"], 0, 1)
@@ -167,8 +168,8 @@ class PictureFLNR(WholePicture):
         """Those of `picture`, and what the network reads of the surfaces."""
         scene = scene_of(frame) if scene is None else scene
         images = super().images(frame, names, scene, filters)
-        add = _surfaces if filters.average is None else _surfaces.__wrapped__
-        return images | {"surfaces": add(frame, scene, images["guides"])}
+        add = _surfaces if filters.layers is None else _surfaces.__wrapped__
+        return images | add(frame, scene, images["guides"])
 
     def before_network(self) -> tuple[Stage, ...]:
         """The stages before the one that corrects."""
@@ -191,7 +192,7 @@ class PictureFLNR(WholePicture):
 def put(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
     """The picture that the network is to correct, `(H, W, 3)`, and its error."""
     error = parts["error"] * light_of(parts["surface"])[..., None]
-    return {"fitted": composed(parts, known.get("average", average)), "noise": error}
+    return {"fitted": known.get("composed", composed)(parts), "noise": error}
 
 
 def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
@@ -221,7 +222,7 @@ def _surfaces(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
     none, one = xp.zeros_like(normal), xp.ones_like(normal[..., :1])
     guess = xp.where(scene.averaged, SAMPLES, 1) * one
     samples = guess if frame.samples is None else frame.samples
-    return {
+    surfaces = {
         "albedo": albedo,
         "albedo_left": xp.clip(number(picture.albedo), 0, 1) - albedo,
         "normal": normal,
@@ -230,3 +231,4 @@ def _surfaces(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
         "depth": xp.clip(number(clean.get("depth", one)), 0, DEEPEST),
         "samples": xp.where(samples > 0, samples, guess),
     }
+    return {"surfaces": surfaces, "noisy_own": own_light(picture)}

@@ -45,6 +45,13 @@ def to_image(values: Any) -> Any:
     return np.require(array, dtype, ["C", "ALIGNED"])
 
 
+def to_device(context: Context, layer: Any) -> Any:
+    """A layer as a device array of float32."""
+    if is_device_array(layer):
+        return layer
+    return context.array(np.require(layer, np.float32, ["C", "ALIGNED"]))
+
+
 def to_layers(context: Context, guides: Any) -> tuple[Any, ...]:
     """The guides as at most `PARTS` device arrays of one type, none of them without channels."""
     layers = [to_image(layer) for layer in layers_of(guides) if layer.shape[2]]

@@ -8,9 +8,9 @@ from jflnr.bmfr import pipeline
 from jflnr.bmfr.pipeline import BMFR, DARK, PAPER, History
 from jflnr.checks import one_sentence
 from jflnr.frame import Frame
-from jflnr.opencl.arguments import to_output
+from jflnr.opencl.arguments import to_device, to_output
 from jflnr.opencl.bmfr_fit import fit
-from jflnr.opencl.context import Context, default_context, is_device_array
+from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import guide_defines, run_on_rows
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 
@@ -63,13 +63,6 @@ def step(
     surface = Surface(layers["normal"], layers["depth"], layers["position"])
     following = History(history.number + 1, surface, count, light, mean, smooth)
     return following, context.finish(output, result)
-
-
-def to_device(context: Context, layer: Any) -> Any:
-    """A layer as a device array of float32."""
-    if is_device_array(layer):
-        return layer
-    return context.array(np.require(layer, np.float32, ["C", "ALIGNED"]))
 
 
 def accumulate_light(

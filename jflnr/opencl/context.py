@@ -137,6 +137,10 @@ class Context:
         buffer = self.cl.Buffer(self.context, access | flags.USE_HOST_PTR, hostbuf=values)
         return self.cl.array.Array(self.queue, values.shape, values.dtype, data=buffer)
 
+    def to_fill(self, result: np.ndarray) -> Any:
+        """A device array that `finish` makes readable as `result`."""
+        return self.array(result, writable=True) if self.on_cpu else self.empty(result.shape)
+
     def finish(self, output: Any, result: Any) -> Any:
         """Make the device array `output` readable as `result`, a numpy array or `output` itself."""
         if self.on_cpu:

@@ -10,6 +10,7 @@ import numpy as np
 
 from jflnr.network import features, picture, unet
 from jflnr.network.flnr import LARGEST
+from jflnr.opencl.arguments import to_device
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP as MARGIN
 from jflnr.opencl.moments import guide_arguments, guide_defines, pixel_defines
@@ -75,13 +76,13 @@ def correct(
 
 def correct_picture(context: Context, params: unet.Params, read: picture.Read) -> np.ndarray:
     """The corrected picture, `(H, W, 3)`, of and to arrays of numpy."""
-    images = [context.array(np.require(image, np.float32, ["C", "ALIGNED"])) for image in read]
+    images = [to_device(context, image) for image in read]
     named = dict(zip(read._fields, images, strict=True))
     size, defines = read.light.shape[:2], guide_defines((), 3) | {"PICTURE": 1}
     defines["MOST_SAMPLES"] = picture.MOST_SAMPLES
     _, said = _said(context, params, size, picture.Read.PIXEL, defines, images)
     result = np.empty(read.light.shape, np.float32)
-    output = context.array(result, writable=True) if context.on_cpu else context.empty(result.shape)
+    output = context.to_fill(result)
     _write(context, said, (named["alpha"],), named["light"], output, {"PICTURE": 1} | DARK)
     return context.finish(output, result)
 

@@ -9,8 +9,7 @@ import numpy as np
 from jflnr.checks import one_sentence
 from jflnr.frame import Frame
 from jflnr.opencl import twins
-from jflnr.opencl.arguments import to_layers
-from jflnr.opencl.bmfr import to_device
+from jflnr.opencl.arguments import to_device, to_layers
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
 from jflnr.opencl.moments import guide_defines, run_on_rows
@@ -69,7 +68,7 @@ def step(
     least = temporal.light, temporal.image
     light, weight = accumulate(context, light, change, sample, covered, least[0])
     images = {"target": light.mean, "guides": layers, "weight": weight}
-    fitted = twins.regress(method, images, context, composed=False, on_device=True)
+    fitted = twins.regress(method, images, context, to_picture=False, on_device=True)
     image, _ = accumulate(context, image, change, fitted["image"], covered, least[1])
     result: Any = image.mean
     averaged: Any = light.mean

@@ -7,7 +7,8 @@ from typing import Any
 from jflnr.images.noisy_guides import Filters
 from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
-from jflnr.opencl.edges import average
+from jflnr.opencl.detail import composed
+from jflnr.opencl.edges import filter_layers
 from jflnr.opencl.flnr import flnr, picture_light
 from jflnr.opencl.flr import flr
 from jflnr.opencl.network import correct_picture
@@ -26,28 +27,31 @@ REGRESSIONS: dict[str, Callable[..., Any]] = {
 
 def filters_on(context: Context) -> Filters:
     """What takes the noise from guides, on the device."""
-    here = (functools.partial(filter, context=context) for filter in (smooth_guide, average))
+    here = (functools.partial(filter, context=context) for filter in (smooth_guide, filter_layers))
     return Filters(*here)
 
 
 def known_on(context: Context) -> Known:
     """What the composing stages of a method take to be done on the device."""
     correct = functools.partial(correct_picture, context)
-    return {"average": filters_on(context).average, "corrected": correct}
+    return {"composed": functools.partial(composed, context=context), "corrected": correct}
 
 
 def regress(
     method: Any,
     images: Parts,
     context: Context,
-    composed: bool = True,
+    to_picture: bool = True,
     out: Any | None = None,
     **options: Any,
 ) -> Parts:
-    """`jflnr.stages.regress` on the device. out: where `image` is to be. options: as of `flr`."""
+    """`jflnr.stages.regress` on the device.
+
+    to_picture: its `composed`. out: where `image` is to be. options: as of `flr`.
+    """
     others = ("guides_map", "weight")
     given = {name: images[name] for name in others if images.get(name) is not None} | options
-    later = composed and any(stage.composes for stage in method.stages())
+    later = to_picture and any(stage.composes for stage in method.stages())
     run = REGRESSIONS[type(method).__name__]
     given |= {"context": context, "out": None if later else out}
     found = run(images["target"], images["guides"], method, **given)

@@ -90,7 +90,7 @@ def _windows(near: jax.Array, there: jax.Array, steepness: jax.Array) -> jax.Arr
     return lax.fori_loop(0, side**2, add, empty)
 
 
-def structure(image: Any) -> Any:
+def structure(image: jax.Array) -> jax.Array:
     """Mean products of the gradients, down by down, down by right and right by right, `(3, H, W)`.
 
     The form of a step is the square of what all planes of `image`, `(K, H, W)`, change over it.
@@ -103,37 +103,40 @@ def structure(image: Any) -> Any:
     return tensor
 
 
-def _slope(image: Array, axis: int) -> Array:
+def _slope(image: jax.Array, axis: int) -> jax.Array:
     before, _, after = _three(image, axis)
-    return _as_it_is((after - before) / 2)
+    # XLA is not to compute it anew for every pixel that reads it.
+    return lax.optimization_barrier((after - before) / 2)
 
 
 def filter_features(
-    steering: Sequence[Array],
-    following: Sequence[Array],
-    samples: Array | float = SAMPLES,
-    average: Callable[..., Any] = average,
-) -> tuple[Array, ...]:
+    steering: Sequence[Array], following: Sequence[Array], samples: Array | float = SAMPLES
+) -> tuple[jax.Array, ...]:
     """Features averaged along the edges that they share.
 
     steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
     following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
     finite in either is left out of the averages, and gets that of its neighbours.
-    samples: per pixel, that either is made of, or `(H, W, 1)`. average: that above, or of a device.
+    samples: per pixel, that either is made of, or `(H, W, 1)`.
     Returns the features of `following`.
     """
-    xp: Any = steering[0].__array_namespace__()
     steer, follow = (
-        xp.stack([layer[..., q] for layer in layers for q in range(layer.shape[-1])])
+        jnp.moveaxis(jnp.concatenate([jnp.asarray(layer) for layer in layers], axis=-1), -1, 0)
         for layers in (steering, following)
     )
-    usable = xp.all(xp.isfinite(steer), axis=0) & xp.all(xp.isfinite(follow), axis=0)
-    alike = xp.sqrt(VARIANCE / xp.maximum(xp.asarray(samples), 1) + LEAST)
-    alike = xp.reshape(alike, alike.shape[:2])
-    _, filtered = average(xp.where(usable, steer, 0), follow, usable, alike)
-    filtered = xp.moveaxis(filtered, 0, -1)
-    ends = [layer.shape[-1] for layer in following]
-    return tuple(filtered[..., sum(ends[:i]) : sum(ends[: i + 1])] for i in range(len(ends)))
+    usable = jnp.all(jnp.isfinite(steer), axis=0) & jnp.all(jnp.isfinite(follow), axis=0)
+    alike: Any = alike_of(jnp.asarray(samples))
+    _, averages = average(jnp.where(usable, steer, 0), follow, usable, alike)
+    filtered = jnp.moveaxis(averages, 0, -1)
+    ends = np.cumsum([layer.shape[-1] for layer in following])[:-1].tolist()
+    return tuple(jnp.split(filtered, ends, axis=-1))
+
+
+def alike_of(samples: Array) -> Array:
+    """How far features of so many samples per pixel may differ, `()` or `(H, W)`."""
+    xp: Any = samples.__array_namespace__()
+    alike = xp.sqrt(VARIANCE / xp.maximum(samples, 1) + LEAST)
+    return xp.reshape(alike, alike.shape[:2])
 
 
 def coverage(image: Array, least: Array | float) -> Array:
@@ -143,12 +146,9 @@ def coverage(image: Array, least: Array | float) -> Array:
     what is alike along the edge. image: `(H, W, C)`. least: brightness below which nothing counts
     as bright, `()`. Returns `(H, W, C)`, about 0 to 1.
     """
-    xp: Any = image.__array_namespace__()
-    # numpy is slow to go over the last axis.
-    peaks = (image[..., c] for c in range(image.shape[-1]))
-    peak = functools.reduce(xp.maximum, (xp.where(xp.isfinite(a), a, 0) for a in peaks))
-    peak = combine(peak, REACH, xp.maximum)
-    return image / xp.maximum(blur(blur(peak[None]))[0], least)[..., None]
+    peak = jnp.max(jnp.where(jnp.isfinite(image), image, 0), axis=-1)
+    nearby: Any = combine(peak, REACH, jnp.maximum)
+    return image / jnp.maximum(blur(blur(nearby[None]))[0], least)[..., None]
 
 
 def combine(image: Array, reach: int, two: Callable[[Array, Array], Array]) -> Array:
@@ -164,26 +164,20 @@ def combine(image: Array, reach: int, two: Callable[[Array, Array], Array]) -> A
     return image
 
 
-def blur(image: Any) -> Any:
+def blur(image: jax.Array) -> jax.Array:
     """The mean over 3 x 3 pixels with the weights 1, 2, 1, `(K, H, W)`; borders are repeated."""
     for axis in (1, 2):
         before, here, after = _three(image, axis)
-        image = _as_it_is((before + 2 * here + after) / 4)
+        image = lax.optimization_barrier((before + 2 * here + after) / 4)
     return image
 
 
-def _three(image: Array, axis: int) -> list[Array]:
+def _three(image: jax.Array, axis: int) -> list[jax.Array]:
     """The pixels before, those here and those after, along an axis; borders are repeated."""
-    xp: Any = image.__array_namespace__()
     margin = [(1, 1) if a == axis else (0, 0) for a in range(3)]
-    padded = xp.pad(image, margin, mode="edge")
+    padded = jnp.pad(image, margin, mode="edge")
     return [_rows(padded, axis, k, image.shape[axis]) for k in range(3)]
 
 
-def _rows(image: Array, axis: int, first: int, count: int) -> Array:
+def _rows(image: Any, axis: int, first: int, count: int) -> Any:
     return image[(slice(None),) * axis + (slice(first, first + count),)]
-
-
-def _as_it_is(image: Array) -> Array:
-    """What XLA is not to compute anew for every pixel that reads it."""
-    return image if isinstance(image, np.ndarray) else lax.optimization_barrier(image)

@@ -19,14 +19,13 @@ from jflnr.frame import Array, Frame
 from jflnr.images.guides import FAR, Scene, draw_near, mean_light, scene_of
 from jflnr.images.inputs import same_size
 from jflnr.images.noisy_guides import FILTERS, Filters, antialiased, holds_light
-from jflnr.lazy import jax, jit, pytree
+from jflnr.lazy import jax, jit, jnp, pytree
 from jflnr.regression.adaptive import AdaptiveFLR, light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH, find_detail
 from jflnr.regression.features import (
     FARTHEST,
     SAMPLES,
-    average,
     combine,
     coverage,
     filter_features,
@@ -51,8 +50,6 @@ EVERYTHING = 1 << 20
 
 
 GUIDES = "normal", "albedo", "seen_normal", "depth", "position"
-# Depth and position of the pixels' centres are aliased, and would break thin lines.
-STEERING = "albedo", "normal", "seen_normal", "emission", "environment", "alpha"
 
 
 class Picture(NamedTuple):
@@ -84,19 +81,19 @@ def cleaned(
     unit: Array,
     samples: Array | float | None,
     averaged: Array,
-    average: Callable[..., Any] = average,
+    filtered: Callable[..., Any] | None = None,
 ) -> Picture:
     """The picture with layers that are free of noise.
 
     unit: brightness of the picture, `()`. samples: per pixel, or `(H, W, 1)`; 0 if nobody says how
     many, None if there may be none but of the pixels' centres. averaged: whether the layers show
-    that they are means of several, `()`. average: `features.average`, or that of a device.
+    that they are means of several, `()`. filtered: `filter_layers`, or that of a device.
     """
     xp: Any = picture.beauty.__array_namespace__()
     if samples is not None:
         guess = xp.where(averaged, SAMPLES, 1)
-        return filter_picture(picture, unit, xp.where(samples > 0, samples, guess), average)
-    clean = filter_picture(picture, unit, SAMPLES, average)
+        return filter_picture(picture, unit, xp.where(samples > 0, samples, guess), filtered)
+    clean = filter_picture(picture, unit, SAMPLES, filtered)
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
     chosen = {name: xp.where(averaged, getattr(clean, name), layers[name]) for name in layers}
     return picture._replace(**chosen)
@@ -124,19 +121,17 @@ def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Part
     return images | {"colours": (picture.colours, clean.colours)}
 
 
-def composed(images: Parts, average: Callable[..., Any] = average) -> Array:
+def composed(images: Parts) -> Array:
     """The picture `(H, W, 3)` from `image`, its light without noise, with its detail.
 
-    It is nowhere darker than what is emitted and seen of the environment. average:
-    `features.average`, or that of a device.
+    It is nowhere darker than what is emitted and seen of the environment.
     """
-    xp: Any = images["surface"].__array_namespace__()
     noisy, fitted = (
-        xp.maximum(images[light], 0) * images["surface"] + images["own"]
+        jnp.maximum(images[light], 0) * images["surface"] + images["own"]
         for light in ("target", "image")
     )
-    detail = find_detail(noisy, fitted, images["weight"], images["brightness"], average)
-    return xp.maximum(fitted + detail, images["own"])
+    detail = find_detail(noisy, fitted, images["weight"], images["brightness"])
+    return jnp.maximum(fitted + detail, images["own"])
 
 
 @pytree
@@ -183,9 +178,9 @@ class WholePicture(AdaptiveFLR):
     ) -> Parts:
         """The light of the surfaces, the guides, and what makes it a picture again."""
         scene = scene_of(frame) if scene is None else scene
-        if filters.average is None:
+        if filters.layers is None:
             return _images(frame, scene)
-        return _images.__wrapped__(frame, scene, filters.average)
+        return _images.__wrapped__(frame, scene, filters.layers)
 
     def stages(self) -> tuple[Stage, ...]:
         fit = super().stages()
@@ -225,7 +220,7 @@ def denoise_picture(
 @QUIETLY
 def compose(method: WholePicture, parts: Parts, known: Known) -> Parts:
     """What `finished` says, of the light that the fit gave."""
-    picture = composed(parts, known.get("average", average))
+    picture = known.get("composed", composed)(parts)
     if method.with_error:
         parts = parts | {"error": parts["error"] * light_of(parts["surface"])[..., None]}
     return finished(method, picture, parts)
@@ -258,10 +253,10 @@ def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
 
 
 @jit
-def _images(frame: Frame, scene: Scene, average: Callable[..., Any] = average) -> Parts:
+def _images(frame: Frame, scene: Scene, filtered: Callable[..., Any] | None = None) -> Parts:
     picture = picture_in(frame, scene)
     assert scene.averaged is not None and scene.light is not None and scene.lit is not None
-    clean = cleaned(picture, scene.light, frame.samples, scene.averaged, average)
+    clean = cleaned(picture, scene.light, frame.samples, scene.averaged, filtered)
     images = images_of(picture, clean, scene.light, scene.lit)
     return images | {"lobes": frame.lobes}
 
@@ -312,25 +307,53 @@ def filter_picture(
     picture: Picture,
     unit: Array,
     samples: Array | float,
-    average: Callable[..., Any] = average,
+    filtered: Callable[..., Any] | None = None,
 ) -> Picture:
     """Every layer but the beauty without its noise. unit: brightness of the picture, `()`."""
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
     xp: Any = layers.pop("beauty").__array_namespace__()
-    unit = xp.maximum(unit, 1e-12)
-    steering = [steer(name, layer, unit) for name, layer in layers.items() if name in STEERING]
-    filtered = filter_features(steering, list(layers.values()), samples, average)
-    return picture._replace(**dict(zip(layers, filtered, strict=True)))
+    found = (filtered or filter_layers)(layers, xp.maximum(unit, 1e-12), samples)
+    return picture._replace(**dict(zip(layers, found, strict=True)))
 
 
-def steer(name: str, layer: Array, unit: Array) -> Array:
-    """A layer so scaled that it varies by about 1. unit: brightness of the picture, `()`."""
+def filter_layers(
+    layers: dict[str, Array], unit: Array, samples: Array | float
+) -> tuple[Array, ...]:
+    """The layers of a picture without their noise. unit, samples: as of `cleaned`."""
+    how = {name: steer_of(name, unit) for name in layers}
+    steering = [steer(layers[name], steered) for name, steered in how.items() if steered]
+    return filter_features(steering, list(layers.values()), samples)
+
+
+class Steer(NamedTuple):
+    """How a layer is scaled to vary by about 1, to tell the edges.
+
+    mean: of its channels only. least: of what covers a pixel, the brightness of what counts as
+    bright; None for a layer that is multiplied by `factor` instead.
+    """
+
+    mean: bool = False
+    least: Any = None
+    factor: float = 1.0
+
+
+def steer_of(name: str, unit: Array) -> Steer | None:
+    """How a layer steers; None for depth and position of the pixels' centres, which are aliased and
+    would break thin lines, and others that do not. unit: brightness of the picture, `()`."""
     if name in ("emission", "environment"):
-        red, green, blue = (layer[..., c : c + 1] for c in range(3))
-        return coverage((red + green + blue) / 3, unit)
+        return Steer(mean=True, least=unit)
     if name == "albedo":
-        return coverage(layer, 1.0)
-    return layer if name == "alpha" else layer / 2
+        return Steer(least=1.0)
+    if name == "alpha":
+        return Steer()
+    return Steer(factor=0.5) if name in ("normal", "seen_normal") else None
+
+
+def steer(layer: Array, how: Steer) -> Array:
+    """A layer so scaled that it varies by about 1."""
+    if how.mean:
+        layer = jnp.mean(layer, axis=-1, keepdims=True)
+    return how.factor * layer if how.least is None else coverage(layer, how.least)
 
 
 def firefly_weight(light: Array) -> Array:

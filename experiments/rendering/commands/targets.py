@@ -1,6 +1,7 @@
 """`render targets`: adds to the training frames what the network is trained on; resumes.
 
-A hundred guided samples are noisier than what adaptive FLR makes of sixteen, and teach little.
+A hundred guided samples are noisier than what adaptive FLR makes of sixteen, and teach little; and
+a denoiser that they are put through must not hand on what it takes for noise.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import scipy.ndimage
 
 from experiments.peers import oidn
 from jflnr import exr
 from jflnr.frame import HALF_MAX, Frame, read_frame
-from jflnr.metrics import exposure
+from jflnr.metrics import display, exposure
+
+# Share of the noise that an error must exceed, or chance would let noise in.
+DOUBT = 0.25
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -48,10 +53,29 @@ def of_light(frame: Frame) -> np.ndarray:
 
 
 def of_picture(channels: dict[str, np.ndarray]) -> np.ndarray:
-    """The reference of a whole picture, denoised with the layers of as many samples."""
-    wanted = {"reference": "RGB", "seen_albedo": "RGB", "seen_normal": "XYZ"}
-    picture, albedo, normal = (
+    """The reference of a whole picture, denoised with its layers, `(H, W, 3)`."""
+    wanted = {"reference": "RGB", "seen_albedo": "RGB", "seen_normal": "XYZ", "reference_a": "RGB"}
+    picture, albedo, normal, first = (
         np.stack([channels[f"{name}.{c}"] for c in parts], axis=-1).astype(np.float32)
         for name, parts in wanted.items()
     )
-    return oidn.prefiltered(picture, albedo=np.clip(albedo, 0, 1), normal=normal)
+    denoised = oidn.prefiltered(picture, albedo=np.clip(albedo, 0, 1), normal=normal)
+    return with_detail(denoised, first, 2 * picture - first)
+
+
+def with_detail(denoised: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The denoised picture, with as much of the noisy one as makes the least error, `(H, W, 3)`.
+
+    first, second: independent halves of the noisy one. What is left of both denoised in common,
+    over a window, is error; what they differ by is noise.
+    """
+    noisy = (first + second) / 2
+    scale = exposure(noisy)
+    a, b, shown = (display(image, scale) for image in (first, second, denoised))
+
+    def mean(image: np.ndarray) -> np.ndarray:
+        return scipy.ndimage.uniform_filter(image.mean(axis=-1, keepdims=True), (9, 9, 1))
+
+    noise = mean((a - b) ** 2) / 4
+    error = np.maximum(mean((shown - a) * (shown - b)) - DOUBT * noise, 0)
+    return denoised + error / np.maximum(error + noise, 1e-9) * (noisy - denoised)
