@@ -95,7 +95,7 @@ kernel void average(
 #pragma unroll
             for (int k = 0; k < FOLLOWING; ++k) {
                 const real value = lanes_at(follow + k * size + other, width, x0 + j);
-                sums[k] += counts > 0 ? weight * value : (real)0;
+                sums[k] += weight * (counts > 0 ? value : (real)0);
             }
         }
     }

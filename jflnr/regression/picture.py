@@ -9,6 +9,7 @@ filtered as features are.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
@@ -300,7 +301,8 @@ def reflecting(picture: Picture, lit: Array) -> Array:
 def light_in(picture: Picture, *parts: Array | None) -> Array:
     """The sum of those parts that there are, `(H, W, 3)`."""
     xp: Any = picture.beauty.__array_namespace__()
-    return sum((part for part in parts if part is not None), xp.zeros_like(picture.beauty))
+    there = [part for part in parts if part is not None]
+    return functools.reduce(xp.add, there) if there else xp.zeros_like(picture.beauty)
 
 
 def filter_picture(
