@@ -115,7 +115,7 @@ def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
     over = xp.where(unit > 0, unit, 1)
 
     def shown(image: Any) -> Any:
-        return xp.clip(xp.nan_to_num(image / over), 0, BRIGHTEST)
+        return xp.minimum(xp.fmax(image / over, 0), BRIGHTEST)
 
     noisy = parts["target"] * parts["surface"] + parts["noisy_own"]
     light = [shown(image) for image in (parts["fitted"], noisy, parts["noise"], parts["own"])]
@@ -216,7 +216,7 @@ def _surfaces(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
     xp: Any = picture.beauty.__array_namespace__()
     there = [name for name in GUIDES if getattr(picture, name) is not None]
     clean = dict(zip(there, guides, strict=True))
-    number = xp.nan_to_num
+    number = lambda image: xp.where(xp.isfinite(image), image, 0)
     albedo, normal = number(clean["albedo"]), number(clean["normal"])
     left = number(picture.normal) - normal
     none, one = xp.zeros_like(normal), xp.ones_like(normal[..., :1])
@@ -226,7 +226,7 @@ def _surfaces(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
         "albedo": albedo,
         "albedo_left": xp.clip(number(picture.albedo), 0, 1) - albedo,
         "normal": normal,
-        "normal_left": xp.sqrt(xp.sum(left**2, axis=-1, keepdims=True)),
+        "normal_left": xp.sqrt(xp.einsum("...c,...c", left, left))[..., None],
         "seen_normal": number(clean.get("seen_normal", none)),
         "depth": xp.clip(number(clean.get("depth", one)), 0, DEEPEST),
         "samples": xp.where(samples > 0, samples, guess),

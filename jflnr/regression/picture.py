@@ -103,21 +103,25 @@ def cleaned(
 def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Parts:
     """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again.
 
-    unit: brightness of the picture, `()`. lit: as of `holds_light`.
+    unit: brightness of the picture, `()`. lit: whether its albedo shows what shines, as
+    `holds_light` says.
     """
     xp: Any = picture.beauty.__array_namespace__()
     covered = xp.ones((1,) * 3, xp.float32) if clean.alpha is None else xp.clip(clean.alpha, 0, 1)
-    surface = xp.maximum(reflecting(clean, lit), LEAST_ALBEDO * covered)
+    shining = xp.where(lit, light_in(clean, clean.emission, clean.environment), 0)
+    surface = xp.maximum(clean.albedo - shining, LEAST_ALBEDO * covered)
     light = xp.maximum(picture.beauty - own_light(picture), 0) / xp.maximum(surface, 1e-6)
     weight = firefly_weight(light_of(light)) * (covered > LEAST_ALPHA)[..., 0]
     guiding = clean._replace(albedo=xp.clip(clean.albedo, 0, 1))
     layers = [getattr(guiding, name) for name in GUIDES]
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
-    own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
     images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
     # By rows, as parts of a frame are.
     images |= {"brightness": xp.broadcast_to(unit, (len(light), 1, 1))}
+    if picture.colours is None:
+        return images
+    own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
     images |= {"emitted": own[0], "environment": own[1]}
     return images | {"colours": (picture.colours, clean.colours)}
 
@@ -289,13 +293,6 @@ def own_light(picture: Picture) -> Array:
     """What no surface reflects and beauty holds, `(H, W, 3)`: emission, and what is behind all."""
     behind = None if picture.alpha is not None else picture.environment
     return light_in(picture, picture.emission, behind)
-
-
-def reflecting(picture: Picture, lit: Array) -> Array:
-    """The albedo of what reflects alone, `(H, W, 3)`. lit: as of `holds_light`."""
-    xp: Any = picture.albedo.__array_namespace__()
-    own = light_in(picture, picture.emission, picture.environment)
-    return xp.maximum(picture.albedo - xp.where(lit, own, 0), 0)
 
 
 def light_in(picture: Picture, *parts: Array | None) -> Array:

@@ -6,7 +6,7 @@ import pytest
 
 import jflnr
 from jflnr.images.noisy_guides import holds_light
-from jflnr.regression.picture import Picture, WholePicture, denoise_picture, reflecting
+from jflnr.regression.picture import Picture, WholePicture, denoise_picture, images_of
 
 FEW = WholePicture(levels=2)
 
@@ -75,7 +75,7 @@ def test_light_that_the_albedo_holds_is_taken_from_it(rng, film):
     added = plain._replace(albedo=plain.albedo + own["emission"] + own["environment"])
     for one, lit in ((plain, False), (added, True)):
         assert holds_light(one.albedo, own["emission"] + own["environment"]) == lit
-        reflected = reflecting(one, lit)
+        reflected = images_of(one, one, np.float32(1), lit)["surface"]
         np.testing.assert_allclose(reflected, picture.albedo, atol=1e-5)
 
 
