@@ -1,7 +1,7 @@
 """The methods by name. Nothing here imports JAX, so that a command line can list them at once.
 
 A method is a frozen dataclass, a pytree: its numbers are leaves, its options are static. It says
-- `name`, and `backends`, those that it runs on, if not on all;
+- `name`;
 - `for_frame(inputs, names)`: the method with what it takes from the frame's size filled in, or
   `ValueError` for a frame that it cannot denoise (another set of guides, light of another size);
 - `images(frame, names, scene, filters)`: what it reads of the pixels, and `margin`, how many pixels
@@ -12,9 +12,8 @@ A method is a frozen dataclass, a pytree: its numbers are leaves, its options ar
 - `features`: the layers that it reads, if they are its own, and `guides`, those of them that are
   guides, if not all are; else users choose guides.
 
-Drivers run any such method: whole, in tiles and over time. In place of stages, a method whose
-frames cannot be cut has `denoise(inputs, names)`, and one with a history of its own `start(frame)`
-and `step(state, frame)`.
+Drivers run any such method: whole, in tiles and over time. In place of stages, one with a history
+of its own has `start(frame)` and `step(state, frame)`.
 """
 
 import dataclasses
@@ -32,7 +31,7 @@ HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "flnr-small": ("jflnr.network.flnr", "FLNR", {"size": "small"}),
     "flnr": ("jflnr.network.flnr", "FLNR", {}),
     "bmfr": ("jflnr.bmfr.pipeline", "BMFR", {}),
-    "auto": ("jflnr.auto.method", "Auto", {}),
+    "auto": ("jflnr.regression.auto", "Auto", {}),
 }
 # What denoises a frame if nobody says: pictures of other programs are denoised whole.
 DEFAULT, WHOLE = "flr", "picture"
