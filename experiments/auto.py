@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -51,7 +52,8 @@ def one(key: str, quick: bool) -> dict[str, Any]:
     row["refined"] = float(np.mean(signal > Auto().worth))
     if not quick and int(spp) in TIMED:
         large = tiled(frame)
-        timed = {name: lambda denoise=calls[name]: denoise(large) for name in METHODS}
+        timed: dict[str, Callable[[], Any]]
+        timed = {name: functools.partial(calls[name], large) for name in METHODS}
         times = interleaved(timed, REPEATS, time.process_time)
         row |= {f"{name}, processor ms": 1e3 * t for name, t in times.items()}
     coarse, whole = (in_tiles(error[name], side) for name in ("nowhere", "everywhere"))
@@ -60,17 +62,17 @@ def one(key: str, quick: bool) -> dict[str, Any]:
 
 def denoisers() -> dict[str, Callable[[Frame], Array]]:
     """The methods, and auto with nothing and with everything refined; in OpenCL if it is there."""
-    methods = {name: name for name in METHODS}
+    methods: dict[str, Any] = {name: name for name in METHODS}
     methods |= {"nowhere": Auto(worth=1.0), "everywhere": Auto(worth=None)}
     return {name: jflnr.Denoiser(method, backend="auto") for name, method in methods.items()}
 
 
 def squared_error(frame: Frame, light: Array) -> np.ndarray:
     """Of every pixel as it is displayed, `(H, W)`: what PSNR is the mean of."""
-    wanted = np.float64(frame.albedo) * frame.reference
+    albedo = np.asarray(frame.albedo, np.float64)
+    found, wanted = (albedo * np.asarray(image, np.float64) for image in (light, frame.reference))
     scale = exposure(wanted)
-    shown = display(np.float64(frame.albedo) * light, scale)
-    return np.mean((shown - display(wanted, scale)) ** 2, axis=-1)
+    return np.mean((display(found, scale) - display(wanted, scale)) ** 2, axis=-1)
 
 
 def in_tiles(plane: np.ndarray, side: int) -> np.ndarray:

@@ -16,6 +16,10 @@ kernel void light_moments(
     blocks += AT(2 * x, 2 * y, fine_pitch, K + 1);
     light += (long)y * pitch + x;
     const long plane = (long)h * pitch;
+    if (2 * x >= fine_pitch) {
+        for (int k = 0; k <= XY(0, 0) + Q; ++k) WRITE((real)0, light + k * plane);
+        return;
+    }
 #define SUMS(p) (pair_sums(p, (p) + second, there) + (below ? pair_sums((p) + row, (p) + row + second, there) : (real)0))
     for (int k = 0; k < XY(0, 0); ++k) WRITE(0.25f * SUMS(blocks + k * GROUP), light + k * plane);
     for (int q = 0; q <= Q; ++q) {

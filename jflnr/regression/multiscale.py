@@ -53,10 +53,10 @@ def fit_levels(
 
     coarsest = fit_level(grids[-1], shift, channels, mean, numbers)
     last, steps = (coarsest, coarsest.coefficients), list[Step]()
-    for number, grid in reversed(list(enumerate(grids[:-1]))):
-        spared = number == 0 and steps and numbers.worth is not None
-        size = grid.moments.shape[1:]
-        where = chosen(steps[-1].share, numbers.worth, *size) if spared else None
+    for grid in reversed(grids[:-1]):
+        where = None
+        if grid is grids[0] and steps and numbers.worth is not None:
+            where = chosen(steps[-1].share, numbers.worth, *grid.moments.shape[1:])
         steps.append(refine(grid, *last, shift.size, mean, numbers, fit, where))
         last = steps[-1].fine, steps[-1].merged
     return coarsest, steps
