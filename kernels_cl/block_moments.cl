@@ -1,20 +1,21 @@
-// The one pass of method auto over the light: moments on the finest blocks, and as one more plane the mean
-// square of the brightness. Which pixels are left out, as in moments.cl.
+// The one pass of method auto over the light: moments on the finest blocks, and as two more planes the mean
+// squares of the brightness and of the weight. Which pixels are left out, as in moments.cl.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "images.h"
 #include "products.h"
 #include "grids.h"
+#define PLANES (K + 2)
 #include "means.h"
 
 INLINE void add_blocks(
     int width, int height, int bx, int by, global const target_t *target, GUIDE_PARAMETERS,
     global const weight_t *weight, constant float *shift, global float *block)
 {
-    real sums[K + 1];
+    real sums[PLANES];
 #pragma unroll
-    for (int k = 0; k <= K; ++k) sums[k] = 0;
+    for (int k = 0; k < PLANES; ++k) sums[k] = 0;
     const int left = bx * BLOCK, right = MIN(left + ACROSS * BLOCK, width);
     const int top = by * BLOCK, bottom = MIN(top + BLOCK, height);
     for (int row = top; row < bottom; ++row) {
@@ -35,6 +36,7 @@ INLINE void add_blocks(
                 light += BRIGHTNESS(c) * y[c];
             }
             sums[K] += one * light * light;
+            sums[K + 1] += one * one;
             add_products(sums, one, x, y);
         }
     }
@@ -42,7 +44,7 @@ INLINE void add_blocks(
 }
 
 // One work-item has GROUP blocks: of a group of one that has less, PoCL takes longer to begin with it.
-// Global size (pitch / GROUP, h). blocks: (h, pitch / GROUP, K + 1, GROUP).
+// Global size (pitch / GROUP, h). blocks: (h, pitch / GROUP, PLANES, GROUP).
 kernel void block_moments(
     int width, int height, int h, int pitch, global const target_t *target, GUIDE_PARAMETERS,
     global const weight_t *weight, constant float *shift, global float *blocks)
@@ -52,5 +54,5 @@ kernel void block_moments(
     for (int bx = first; bx < first + GROUP; bx += ACROSS)
         add_blocks(
             width, height, bx, by, target, GUIDE_IMAGES, weight, shift,
-            blocks + AT(bx, by, pitch, K + 1));
+            blocks + AT(bx, by, pitch, PLANES));
 }

@@ -14,6 +14,7 @@
 #define FRACTIONS
 #include "products.h"
 #include "grids.h"
+#define PLANES (K + 1)
 #include "means.h"
 
 #define STEP (4 * BLOCK)

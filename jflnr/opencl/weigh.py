@@ -23,18 +23,19 @@ def collect_blocks(run: Run, images: Images, block: int) -> tuple[Run, Any, Grid
     doubled = *fine.size, *pilot.sizes, pilot.planes, fine.planes
     run.launch("double_pilot", "weigh.cl", fine, doubled)
     numbers = run.numbers.exponent, run.numbers.offset
-    planes = run.mean, fine.planes, blocks.planes
-    run.launch("weigh", "weigh.cl", blocks, (h, pitch, *fine.sizes, *numbers, *planes))
-    return run, light, blocks
+    moments = run.grid(blocks.number - 1, h, blocks.w)
+    planes = run.mean, fine.planes, blocks.planes, moments.planes
+    run.launch("weigh", "weigh.cl", moments, (h, pitch, *fine.sizes, *numbers, *planes))
+    return run, light, moments
 
 
 def _block_moments(run: Run, images: Images, block: int) -> Grid:
-    """Unweighted moments on blocks of `block`, and the mean square of the brightness."""
+    """Unweighted moments on blocks of `block`, and the mean squares of brightness and weight."""
     target, guides, weight = images
     height, width, channels = target.shape
     lanes = lanes_of(run, block)
     h, w = -(-height // block), -(-width // block)
-    blocks = run.grid(plane_count(run.guides, channels) + 1, h, w)
+    blocks = run.grid(plane_count(run.guides, channels) + 2, h, w)
     pitch = blocks.size[1]
     defines = pixel_defines(target, guides, weight, block) | brightness_defines(channels)
     defines["WIDTH"] = lanes

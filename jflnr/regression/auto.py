@@ -20,6 +20,7 @@ from jflnr.frame import Frame
 from jflnr.images.inputs import prepare
 from jflnr.lazy import jax, jit, jnp, pytree
 from jflnr.regression.adaptive import AdaptiveFLR, counted, levels_of, weight_of
+from jflnr.regression.division import divide
 from jflnr.regression.level import brightness, mean_guides, predict
 from jflnr.regression.moments import channels_of, collect, index_xx, index_xy
 from jflnr.regression.multiscale import TILE, in_tiles
@@ -72,20 +73,21 @@ def _signal(method: Auto, frame: Frame, names: tuple[str, ...]) -> jax.Array:
 
 
 def collect_blocks(method: Auto, parts: Parts, known: Known) -> Parts:
-    """The one pass over the light: unweighted moments on the finest blocks, and as one more plane
-    the mean square of the brightness; of the brightness alone, on blocks twice as large."""
+    """The one pass over the light: unweighted moments on the finest blocks, and as two more planes
+    the mean squares of the brightness and of the weight; and moments of the brightness alone, on
+    blocks twice as large."""
     target, guides, shift, unit = parts["target"], parts["guides"], known["shift"], known["unit"]
     weights = brightness(target.shape[-1], unit.dtype) / unit
     planes = collect(target, guides, shift, method.finest, parts["weight"], weights)
     xx = index_xy(0, 0, shift.size, 0)
-    blocks = jnp.concatenate([planes[:xx], planes[xx:-1] / unit, planes[-1:]])
+    blocks = jnp.concatenate([planes[:xx], planes[xx:-2] / unit, planes[-2:]])
     return {"blocks": blocks} | counted(halve(light_moments(blocks, shift.size)), shift.size)
 
 
 def light_moments(blocks: jax.Array, guides: int) -> jax.Array:
     """Moments of the brightness alone, from those of `collect_blocks`."""
-    xx, channels = index_xy(0, 0, guides, 0), channels_of(blocks[:-1], guides)
-    cross = blocks[xx:-1].reshape(guides + 1, channels, *blocks.shape[1:])
+    xx, channels = index_xy(0, 0, guides, 0), channels_of(blocks[:-2], guides)
+    cross = blocks[xx:-2].reshape(guides + 1, channels, *blocks.shape[1:])
     light = jnp.einsum("qchw,c->qhw", cross, brightness(channels, blocks.dtype))
     return jnp.concatenate([blocks[:xx], light])
 
@@ -93,11 +95,12 @@ def light_moments(blocks: jax.Array, guides: int) -> jax.Array:
 def weigh_blocks(method: Auto, parts: Parts, known: Known) -> Parts:
     """Moments of the blocks by their weights, and one plane of the noise that these leave."""
     blocks, pilot, count = parts["blocks"], parts["pilot"], known["shift"].size
-    for name in ("light", "blocks"):
-        pilot = double(pilot, *parts[name].shape[1:])
+    height, width = blocks.shape[1:]
+    pilot = double(double(pilot, -(-height // 2), -(-width // 2)), height, width)
     weights = weight_of(predict(pilot, mean_guides(blocks, count)), known["mean"], method)
-    noise = squared_residual(light_moments(blocks, count), blocks[-1], pilot[:, 0])
-    return {"moments": jnp.concatenate([blocks[:-1] * weights, (noise * weights**2)[None]])}
+    square = squared_residual(light_moments(blocks, count), blocks[-2], pilot[:, 0])
+    own = divide(blocks[-1], blocks[0])  # what the pixels weigh already
+    return {"moments": jnp.concatenate([blocks[:-2] * weights, (square * own * weights**2)[None]])}
 
 
 def squared_residual(light: jax.Array, squares: jax.Array, model: jax.Array) -> jax.Array:

@@ -34,13 +34,18 @@ def striped(count: int) -> tuple[np.ndarray, np.ndarray]:
 def test_is_what_jax_gives(context: Context, gpu_like: Context, width: str, count: int) -> None:
     device = context if width == "vectors" else gpu_like
     target, guides = striped(count)
-    weight = np.ones(SIZE, bool)
-    weight[:24, :70] = False
+    weight = np.random.default_rng(0).integers(1, 4, SIZE).astype(np.float32)
+    weight[:24, :70] = 0
     target[30, 31], target[31, 150, 1], guides[32, 33, 0] = np.nan, np.inf, np.nan
     found = flr_adaptive(target, guides, METHOD, weight=weight, context=device, with_error=True)
     guides = np.pad(guides, ((0, 0), (0, 0), (0, MOST - count)))
     for one, other in zip(found, by_jax(target, guides, weight=weight), strict=True):
         assert error(one, np.asarray(other)) < tolerances.ADAPTIVE
+
+
+def test_weights_count_relative_to_each_other(context: Context) -> None:
+    run = functools.partial(flr_adaptive, *striped(5), METHOD, context=context)
+    assert error(run(weight=np.full(SIZE, 4, np.float32)), run()) < 1e-5
 
 
 def test_some_tiles_are_refined_and_others_are_not(context: Context) -> None:

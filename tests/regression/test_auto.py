@@ -91,7 +91,7 @@ def test_residual_from_moments_is_that_of_the_pixels(rng: np.random.Generator) -
     images = (jnp.float32(image.reshape(8, 8, -1)) for image in (y, x))
     planes = collect(*images, jnp.zeros(4), 8, None, brightness(3, jnp.float32))
     found = squared_residual(
-        light_moments(planes, 4), planes[-1], jnp.float32(model)[:, None, None]
+        light_moments(planes, 4), planes[-2], jnp.float32(model)[:, None, None]
     )
     literal = np.mean((y @ WEIGHTS - np.column_stack([np.ones(64), x]) @ model) ** 2)
     np.testing.assert_allclose(found[0, 0], literal, rtol=1e-4)
