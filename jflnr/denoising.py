@@ -105,12 +105,12 @@ def denoise(
 def backend_for(backend: str, method: Any, tile: int | None = None) -> str:
     """What runs a method: `backend`, or, if that is `auto`, OpenCL where it can, else JAX.
 
-    It can where there is a device and no tiles.
+    It can where there is a device, kernels of the method (all of ours have some) and no tiles.
     """
     checks.choice("backend", backend, (*BACKENDS, AUTO))
     if backend != AUTO:
         return backend
-    if tile is not None:
+    if tile is not None or "opencl" not in getattr(method, "backends", BACKENDS):
         return "jax"
     from jflnr.opencl.devices import NoDevice, all_devices
 
@@ -149,6 +149,8 @@ class Denoiser:
 
     def _checked(self, method: Any) -> Any:
         """The method, if it can do what is asked for."""
+        if self.backend not in getattr(method, "backends", BACKENDS):
+            raise ValueError(f"method {method.name} runs on the jax backend only")
         if self.guides is not None and (own := getattr(method, "features", None)):
             raise ValueError(
                 f"method {method.name} has its own features, {', '.join(own)}; guides are for "

@@ -1,7 +1,7 @@
 """The methods by name. Nothing here imports JAX, so that a command line can list them at once.
 
 A method is a frozen dataclass, a pytree: its numbers are leaves, its options are static. It says
-- `name`;
+- `name`, and `backends`, those that it runs on, if not on all;
 - `for_frame(inputs, names)`: the method with what it takes from the frame's size filled in, or
   `ValueError` for a frame that it cannot denoise (another set of guides, light of another size);
 - `images(frame, names, scene, filters)`: what it reads of the pixels, and `margin`, how many pixels
