@@ -60,9 +60,7 @@ def ours() -> list[Method]:
     """`jflnr.denoise`, every method on every backend that is there."""
     found = []
     for backend in backends():
-        # BMFR is a peer, and auto has no kernels.
-        without = ("bmfr",) if backend == "jax" else ("bmfr", "auto")
-        for method in (name for name in jflnr.METHODS if name not in without):
+        for method in (name for name in jflnr.METHODS if name != "bmfr"):  # which is a peer
             name = method if backend == "jax" else f"{method} ({backend})"
             parameters = {"method": method, "backend": backend}
             found.append(Method(name, "jflnr", jflnr.denoise, parameters, backend == "jax"))

@@ -25,7 +25,7 @@ REPEATS = 5
 def cases(frame: jflnr.Frame, later: jflnr.Frame) -> Iterator[tuple[str, Callable[[], Any]]]:
     """Name and call of everything that a user can ask for."""
     for method in jflnr.METHODS:
-        for backend in ("jax", "opencl") if method != "auto" else ("jax",):
+        for backend in jflnr.BACKENDS:
             yield (
                 f"{method} {backend} whole",
                 partial(jflnr.denoise, frame, method, backend=backend),

@@ -23,7 +23,7 @@ from jflnr.frame import Array, Frame
 Step = Callable[[Any, Frame], tuple[Any, Array]]
 
 # Our spatial methods, which all work with a history.
-SPATIAL = tuple(name for name in jflnr.METHODS if name not in ("bmfr", "auto"))
+SPATIAL = tuple(name for name in jflnr.METHODS if name != "bmfr")
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def methods_on(frame: jflnr.Frame) -> dict[str, Callable[[], Any]]:
     for method in jflnr.METHODS:
         denoise = functools.partial(jflnr.denoise, on_device, method)
         calls[f"denoise {method}, JAX"] = functools.partial(finished, denoise)
-    for method in (m for m in jflnr.METHODS if m != "auto"):  # which has no kernels
+    for method in jflnr.METHODS:
         denoise = functools.partial(jflnr.denoise, frame, method, backend="opencl")
         calls[f"denoise {method}, OpenCL"] = functools.partial(finished, denoise)
     for method in OPENCL:

@@ -1,6 +1,4 @@
 from . import temporal as temporal
-from .auto.method import Auto as Auto
-from .auto.method import select as select
 from .bmfr.pipeline import BMFR as BMFR
 from .denoising import Denoiser as Denoiser
 from .denoising import denoise as denoise
@@ -17,6 +15,7 @@ from .parameters import load_parameters as load_parameters
 from .parameters import save_parameters as save_parameters
 from .regression.adaptive import AdaptiveFLR as AdaptiveFLR
 from .regression.adaptive import flr_adaptive as flr_adaptive
+from .regression.auto import Auto as Auto
 from .regression.flr import FLR as FLR
 from .regression.flr import flr as flr
 from .regression.picture import Picture as Picture

@@ -28,7 +28,7 @@ def one_sentence(function: F) -> F:
             if jax and isinstance(error, jax.errors.JAXTypeError):
                 raise TypeError(
                     "jax.jit, jax.vmap and jax.grad go through methods on the jax backend only, "
-                    "without tile, and not through auto"
+                    "without tile"
                 ) from None
             if jax and isinstance(error, jax.errors.JaxRuntimeError) and "EXHAUSTED" in first:
                 raise MemoryError(f"the device has too little memory: {first}") from None

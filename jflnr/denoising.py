@@ -80,10 +80,10 @@ def denoise(
     method: an object such as `FLR(sigma=12)`, or a name: `picture`, the whole picture
     (docs/layouts.md), `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`,
     the same corrected by a network, `flnr-small`, by a smaller one (docs/flnr.md), `bmfr`, as in
-    the first frame of a sequence (docs/bmfr.md), or `auto`, the smallest model that is good enough
-    for the frame (docs/select.md). If None, `picture` where the frame has a `beauty` and no guides
-    are named, else `flr`. options: fields of the method to replace, such as `block=4`, the pixels
-    on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
+    the first frame of a sequence (docs/bmfr.md), or `auto`, `flr-adaptive` in less time, refined
+    only where it pays (docs/select.md). If None, `picture` where the frame has a `beauty` and no
+    guides are named, else `flr`. options: fields of the method to replace, such as `block=4`, the
+    pixels on a side that share one model, or `keep_energy=True`, to keep the mean radiance exactly.
     guides: names out of normal, depth, ao, position, albedo; by default normal, depth and, where
     the frame has it, ao.
     backend: `jax`, `opencl`, or `auto`: OpenCL where there is a device and it can do what is asked
@@ -105,8 +105,7 @@ def denoise(
 def backend_for(backend: str, method: Any, tile: int | None = None) -> str:
     """What runs a method: `backend`, or, if that is `auto`, OpenCL where it can, else JAX.
 
-    It can where there is a device, kernels of the method (all that denoise by default have some)
-    and no tiles.
+    It can where there is a device, kernels of the method (all of ours have some) and no tiles.
     """
     checks.choice("backend", backend, (*BACKENDS, AUTO))
     if backend != AUTO:
@@ -182,8 +181,6 @@ class Denoiser:
         if hasattr(method, "step"):
             light = self._step(self.start(frame), frame)[1]
             return _given({"image": light}, frame, out)
-        if hasattr(method, "denoise"):
-            return _given({"image": method.denoise(inputs, names)}, frame, out)
         if self.tile is not None:
             return _given(self._tiled(inputs, names, self.tile), frame, out)
         if self.backend == "jax":

@@ -12,9 +12,8 @@ A method is a frozen dataclass, a pytree: its numbers are leaves, its options ar
 - `features`: the layers that it reads, if they are its own, and `guides`, those of them that are
   guides, if not all are; else users choose guides.
 
-Drivers run any such method: whole, in tiles and over time. In place of stages, a method whose
-frames cannot be cut has `denoise(inputs, names)`, and one with a history of its own `start(frame)`
-and `step(state, frame)`.
+Drivers run any such method: whole, in tiles and over time. In place of stages, one with a history
+of its own has `start(frame)` and `step(state, frame)`.
 """
 
 import dataclasses
@@ -32,7 +31,7 @@ HOMES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "flnr-small": ("jflnr.network.flnr", "FLNR", {"size": "small"}),
     "flnr": ("jflnr.network.flnr", "FLNR", {}),
     "bmfr": ("jflnr.bmfr.pipeline", "BMFR", {}),
-    "auto": ("jflnr.auto.method", "Auto", {}),
+    "auto": ("jflnr.regression.auto", "Auto", {}),
 }
 # What denoises a frame if nobody says: pictures of other programs are denoised whole.
 DEFAULT, WHOLE = "flr", "picture"

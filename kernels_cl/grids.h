@@ -60,3 +60,29 @@ INLINE real doubled(const coarse_t *at, int k)
 #endif
     return 0.75f * LANES(real, OWN) + 0.25f * LANES(real, OTHER);
 }
+
+// Whether the tile of GROUP x GROUP blocks of the finest grid that block (x, y) lies in is refined, or one
+// that is at most so many columns and rows of tiles away. tiles: (ceil(h / GROUP), pitch / GROUP); NULL on
+// grids of which everything is.
+INLINE int refined(global const uchar *tiles, int h, int pitch, int x, int y, int columns, int rows)
+{
+    int found = !tiles;
+    for (int j = MAX(y / GROUP - rows, 0); tiles && j <= MIN(y / GROUP + rows, (h - 1) / GROUP); ++j)
+        for (int i = MAX(x - columns * GROUP, 0); i <= MIN(x + columns * GROUP, pitch - 1); i += GROUP)
+            found |= tiles[(j * pitch + i) / GROUP];
+    return found;
+}
+
+// Sums of neighbours: of 2 WIDTH blocks from one to the next group. `there`: whether there is a next.
+INLINE real pair_sums(global const float *first, global const float *next, int there)
+{
+#if WIDTH == 1
+    return first[0] + (there ? next[0] : 0);
+#elif WIDTH == 4
+    const float8 both = (float8)(READ(first), there ? READ(next) : (real)0);
+    return both.even + both.odd;
+#else
+    const float16 both = (float16)(READ(first), there ? READ(next) : (real)0);
+    return both.even + both.odd;
+#endif
+}

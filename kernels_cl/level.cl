@@ -1,6 +1,7 @@
 // One level of adaptive FLR: what must be alike in a window, the edge-aware window in two passes, along
 // rows and along columns, and the models under it. The models' numbers of guides and channels are
-// constants; that there is a coarser grid is told when the kernels run, as `refines` (window.h).
+// constants; that there is a coarser grid is told when the kernels run, as `refines` (window.h), and
+// which tiles of the finest grid are wanted, as `tiles` (grids.h).
 //
 // Defines beside those of the headers: NOISE, 1 if a plane of noise lies behind the moments; POSITIONS, 1
 // if the position in the window is two more guides; ROUNDING, roundings of a sum of squares that may
@@ -27,11 +28,11 @@
 // Global size (pitch / WIDTH, h).
 kernel void features(
     int h, int pitch, int refines, int coarse_h, int coarse_w, int coarse_pitch, float guide_scale,
-    float brightness_scale, global const float *mean, global const float *moments,
-    global const float *found, global float *features)
+    float brightness_scale, global const uchar *tiles, global const float *mean,
+    global const float *moments, global const float *found, global float *features)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
-    if (x >= pitch || y >= h) return;
+    if (x >= pitch || y >= h || !refined(tiles, h, pitch, x, y, 1, 1)) return;
     moments += AT(x, y, pitch, K + NOISE);
     features += AT(x, y, pitch, FEATURE_PLANES);
     for (int q = 0; q <= Q; ++q) EXPECT_BLOCK(moments + XX(q, 0) * GROUP, K + NOISE);
@@ -66,11 +67,11 @@ INLINE real along_row(global const float *p, int x, int pitch, const real *weigh
 //
 // moments: (h, pitch / GROUP, K + NOISE, GROUP). Global size (pitch / WIDTH, h).
 kernel void window_rows(
-    int h, int pitch, int refines, float sigma, global const float *features,
-    global const float *moments, global float *rows)
+    int h, int pitch, int refines, float sigma, global const uchar *tiles,
+    global const float *features, global const float *moments, global float *rows)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
-    if (x >= pitch || y >= h) return;
+    if (x >= pitch || y >= h || !refined(tiles, h, pitch, x, y, 0, 1)) return;
     moments += AT(x, y, pitch, K + NOISE);
     rows += AT(x, y, pitch, ROWS);
     real weights[TAPS], more[TAPS];
@@ -127,11 +128,11 @@ INLINE void along_column(
 // Global size (pitch / WIDTH, h), or the other way round if DOWN.
 kernel void fit(
     int h, int pitch, int refines, int side, float sigma, float eps, float eps_prime,
-    float noise_ridge, float position_ridge, global const float *mean, constant float *shift,
-    global const float *features, global const float *rows, global float *models)
+    float noise_ridge, float position_ridge, global const uchar *tiles, global const float *mean,
+    constant float *shift, global const float *features, global const float *rows, global float *models)
 {
     const int x = (int)get_global_id(DOWN ? 1 : 0) * WIDTH, y = get_global_id(DOWN ? 0 : 1);
-    if (x >= pitch || y >= h) return;
+    if (x >= pitch || y >= h || !refined(tiles, h, pitch, x, y, 0, 0)) return;
     rows += AT(x, y, pitch, ROWS);
     int to_row[TAPS];
     long moved[TAPS];

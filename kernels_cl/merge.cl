@@ -19,7 +19,7 @@
 // Global size (pitch / WIDTH, h).
 kernel void signal(
     int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, float guide_scale,
-    global const float *mean, global const float *moments, global const float *features,
+    global const uchar *tiles, global const float *mean, global const float *moments, global const float *features,
     global const float *fine, global const float *coarse, global float *signal)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
@@ -27,6 +27,12 @@ kernel void signal(
     features += AT(x, y, pitch, Q + 2);
     fine += AT(x, y, pitch, MODELS);
     signal += AT(x, y, pitch, 3);
+    if (!refined(tiles, h, pitch, x, y, 0, 0)) {
+        WRITE((real)0, signal);
+        WRITE((real)0, signal + GROUP);
+        WRITE((real)1, signal + 2 * GROUP);
+        return;
+    }
     for (int q = 0; q <= Q + 1; ++q) EXPECT_BLOCK(fine + LIGHT_PLANE(q) * GROUP, MODELS);
     const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
     real d = READ(fine + LIGHT_PLANE(0) * GROUP) - doubled(&at, LIGHT_PLANE(0));
@@ -84,15 +90,37 @@ kernel void share_columns(
     WRITE(sums[2] > 1e-12f ? MAX(signal, 0) / total : (real)0, share + AT(x, y, pitch, 1));
 }
 
+// tiles: (ceil(h / 2), tiles_w), 1 where the mean of 2 x 2 blocks of `share` is above `worth`.
+// share: (h, pitch) with w columns. Global size (pitch / WIDTH, h).
+kernel void choose(
+    int h, int w, int pitch, int tiles_w, float worth, global const float *share, global uchar *tiles)
+{
+    const int x = (int)get_global_id(0) * WIDTH, y = (int)get_global_id(1) * 2;
+    for (int tile = (x + 1) / 2; y < h && 2 * tile < x + WIDTH && tile < tiles_w; ++tile) {
+        float above = 0;
+        for (int j = y; j < MIN(y + 2, h); ++j)
+            for (int i = 2 * tile; i < MIN(2 * tile + 2, w); ++i)
+                above += share[AT(i, j, pitch, 1)] - worth;
+        tiles[y / 2 * tiles_w + tile] = above > 0;
+    }
+}
+
 // fine, coarse, coarse_merged, merged: models. share: of the coarser grid.
 // Global size (pitch / WIDTH, h).
 kernel void merge(
-    int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, global const float *fine,
-    global const float *coarse, global const float *coarse_merged, global const float *share,
-    global float *merged)
+    int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, global const uchar *tiles,
+    global const float *fine, global const float *coarse, global const float *coarse_merged,
+    global const float *share, global float *merged)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= pitch || y >= h) return;
+    if (!refined(tiles, h, pitch, x, y, 0, 0)) {
+        const coarse_t before =
+            coarse_at(coarse_merged, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
+        merged += AT(x, y, pitch, MODELS);
+        for (int k = 0; k < VARIANCE; ++k) WRITE(doubled(&before, k), merged + k * GROUP);
+        return;
+    }
     const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
     const real part = doubled(&share_at, 0);
     merge_models(

@@ -4,20 +4,6 @@
 #include "vectors.h"
 #include "grids.h"
 
-// Sums of neighbours: of 2 WIDTH blocks from one to the next group. `there`: whether there is a next.
-INLINE real pair_sums(global const float *first, global const float *next, int there)
-{
-#if WIDTH == 1
-    return first[0] + (there ? next[0] : 0);
-#elif WIDTH == 4
-    const float8 both = (float8)(READ(first), there ? READ(next) : (real)0);
-    return both.even + both.odd;
-#else
-    const float16 both = (float16)(READ(first), there ? READ(next) : (real)0);
-    return both.even + both.odd;
-#endif
-}
-
 // planes: h rows `row` apart of groups `group` apart of `count` planes `plane` apart, zero from column
 // w on up to `pitch`. halves: (half_h, half_pitch / GROUP, count, GROUP).
 // Global size (half_pitch / WIDTH, half_h).

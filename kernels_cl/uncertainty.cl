@@ -12,8 +12,8 @@
 // the models keep, and the square of what the merge left out. moments: K + 1 planes. share: of the coarser grid.
 // Global size (pitch / WIDTH, h).
 kernel void error_step(
-    int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, global const float *moments,
-    global const float *fine, global const float *coarse, global const float *share,
+    int h, int pitch, int coarse_h, int coarse_w, int coarse_pitch, global const uchar *tiles,
+    global const float *moments, global const float *fine, global const float *coarse, global const float *share,
     global const float *before, global float *after)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
@@ -24,13 +24,14 @@ kernel void error_step(
     const coarse_t at = coarse_at(coarse, MODELS, coarse_h, coarse_w, coarse_pitch, x, y);
     const coarse_t share_at = coarse_at(share, 1, coarse_h, coarse_w, coarse_pitch, x, y);
     const real n = READ(moments), per_pixel = n > 1e-12f ? 1 / n : (real)0;
-    real change = 0;
-    for (int q = 0; q <= Q; ++q) {
+    const int done = refined(tiles, h, pitch, x, y, 0, 0);
+    real change = 0, more = 0;
+    for (int q = 0; done && q <= Q; ++q) {
         const real guide = q == 0 ? (real)1 : READ(moments + XX(q, 0) * GROUP) * per_pixel;
         change += guide * (READ(fine + LIGHT_PLANE(q) * GROUP) - doubled(&at, LIGHT_PLANE(q)));
     }
     const real kept = doubled(&share_at, 0), dropped = (1 - kept) * change;
-    const real more = READ(fine + VARIANCE * GROUP) - doubled(&at, VARIANCE);
+    if (done) more = READ(fine + VARIANCE * GROUP) - doubled(&at, VARIANCE);
 #ifdef FIRST
     const real variance = doubled(&at, VARIANCE), left_out = 0;
 #else

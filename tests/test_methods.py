@@ -164,7 +164,7 @@ def test_auto_takes_a_device_for_what_it_can_do(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(devices, "all_devices", lambda: ["a device"])
     assert backend_for("auto", flr) == backend_for("auto", None) == "opencl"
     assert backend_for("jax", flr) == "jax"
-    assert backend_for("auto", flr, tile=64) == backend_for("auto", jflnr.Auto()) == "jax"
+    assert backend_for("auto", flr, tile=64) == "jax"
 
     def none() -> list[str]:
         raise devices.NoDevice("none here")

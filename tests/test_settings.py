@@ -61,7 +61,7 @@ def test_strict_settings(frame: Frame, method: str, backend: str, strict: str) -
 
 @pytest.mark.parametrize(
     ("method", "options"),
-    [("flr", {"backend": "opencl"}), ("flr", {"tile": 32}), ("auto", {})],
+    [("flr", {"backend": "opencl"}), ("flr", {"tile": 32})],
 )
 def test_what_jax_cannot_trace_is_one_sentence(frame: Frame, method: str, options: dict) -> None:
     if options.get("backend") == "opencl":

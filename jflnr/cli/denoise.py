@@ -34,7 +34,7 @@ EXAMPLES = """\
   jflnr denoise render.exr -o out/ --method flr-adaptive        its diffuse indirect light only
   jflnr denoise shot/ -o clean/ --temporal --method flr-adaptive      a film, without flicker
   jflnr denoise shot/ -o clean/ --channels all  every pass of the input, with clean light passes
-  jflnr denoise room.exr -o out/ --method auto --explain    what each frame needs, and why
+  jflnr denoise room.exr -o out/ --method auto --explain    where each frame is refined
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
 """
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--explain",
         action="store_true",
-        help="with --method auto: print what it chose and why, and write a map, OUT.plan.png",
+        help="with --method auto: print how much it refines, and write a map, OUT.plan.png",
     )
     add(
         "--backend",

@@ -214,7 +214,9 @@ class Worker:
         if arguments.explain:
             from jflnr.cli.pictures import explain
 
-            record["plan"] = explain(job.explanation, frame, self.settings["guides"])
+            record["plan"] = explain(
+                job.explanation, frame, self.settings["method"], self.settings["guides"]
+            )
         if arguments.reference:
             images = {"noisy": frame.indirect, "denoised": result.lights["indirect"]}
             record["metrics"] = {name: measure(frame, image) for name, image in images.items()}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
@@ -11,11 +11,10 @@ from jflnr.files import replacing
 from jflnr.metrics import display
 
 if TYPE_CHECKING:
-    from jflnr.auto.plan import Plan
     from jflnr.frame import Frame
 
-# From a constant to the model with all guides; also told apart without colour, by brightness.
-COLOURS = np.array([[20, 20, 60], [40, 100, 150], [70, 170, 130], [250, 230, 90]])
+# Of places that are refined, and of the others; also told apart without colour, by brightness.
+REFINED, COARSE = (250, 230, 90), (40, 60, 110)
 
 
 def write_preview(path: Path, picture: np.ndarray, scale: float) -> None:
@@ -23,21 +22,16 @@ def write_preview(path: Path, picture: np.ndarray, scale: float) -> None:
     _save(path, 255 * display(np.nan_to_num(picture), scale))
 
 
-def explain(path: Path, frame: "Frame", guides: Sequence[str] | None) -> list[str]:
-    """The plan of method auto in lines for a person, and the orders of its models as a map."""
-    from jflnr.auto.method import plan_of
+def explain(path: Path, frame: "Frame", method: Any, guides: Sequence[str] | None) -> list[str]:
+    """Where method auto refines a frame, in lines for a person and as a map."""
+    from jflnr.regression.auto import signal_in_tiles
 
-    plan = plan_of(frame, guides)
-    write_map(path, plan, frame.depth.shape[:2])
-    return [*plan.lines(), f"map of the orders: {path}"]
-
-
-def write_map(path: Path, plan: "Plan", size: Sequence[int]) -> None:
-    """The orders of the plan's blocks as colours, at `size` (H, W)."""
-    place = np.clip(plan.order / max(plan.groups, 1), 0, 1) * (len(COLOURS) - 1)
-    channels = [np.interp(place, range(len(COLOURS)), colour) for colour in COLOURS.T]
-    enlarged = np.stack(channels, -1).repeat(plan.side, 0).repeat(plan.side, 1)
-    _save(path, enlarged[: size[0], : size[1]])
+    signal, side = signal_in_tiles(frame, method, guides)
+    height, width = frame.depth.shape[:2]
+    refined = (signal > method.worth).repeat(side, 0).repeat(side, 1)[:height, :width]
+    _save(path, np.where(refined[..., None], REFINED, COARSE))
+    share = f"{refined.mean():.0%} of the frame"
+    return [f"refined: {share}, in tiles of {side} pixels", f"map: {path}"]
 
 
 def _save(path: Path, pixels: np.ndarray) -> None:

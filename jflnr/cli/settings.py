@@ -20,7 +20,7 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     name = arguments.method
     if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
         name = DEFAULT
-    told = ("flr-adaptive", "flnr", "flnr-small", *PICTURES)
+    told = ("flr-adaptive", "auto", "flnr", "flnr-small", *PICTURES)
     if arguments.error_map and name not in told:
         raise ValueError(f"--error-map needs --method {', '.join(told)}")
     if arguments.profile and backend != "opencl":

@@ -40,8 +40,6 @@ def wanted(arguments: argparse.Namespace) -> bool:
     for name in ("error_map", "profile", "lobes"):
         if getattr(arguments, name):
             raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
-    if arguments.method == "auto":
-        raise ValueError("--method auto is for frames by themselves, not shots")
     if arguments.backend == "opencl" and arguments.history is not None:
         raise ValueError("--history keeps what the jax backend remembers: leave out --backend")
     return True

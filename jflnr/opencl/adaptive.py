@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,15 +20,17 @@ from jflnr.opencl.arguments import (
 from jflnr.opencl.context import Context, default_context, is_device_array
 from jflnr.opencl.energy import frame_mean, rescale, restore
 from jflnr.opencl.floor import own_light
-from jflnr.opencl.grids import Grid, Run
-from jflnr.opencl.level import Level, fit_level
-from jflnr.opencl.merge import merge, signal_share
+from jflnr.opencl.grids import Grid, Images, Run
+from jflnr.opencl.level import Level, fit_level, fit_pilot
+from jflnr.opencl.merge import choose, merge, signal_share
 from jflnr.opencl.moments import centre, collect
-from jflnr.opencl.resampling import halve, halve_planes
+from jflnr.opencl.resampling import halve
 from jflnr.opencl.uncertainty import standard_error
+from jflnr.opencl.weigh import collect_blocks
 from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
 from jflnr.regression.arguments import channel_count, check_regression
+from jflnr.regression.auto import Auto
 
 
 class Step(NamedTuple):
@@ -42,9 +44,6 @@ class Step(NamedTuple):
     coarse: Level
     share: Grid
 
-
-# The light, the guides and what each pixel counts, on the device.
-Images: TypeAlias = "tuple[Any, tuple[Any, ...], Any | None]"
 
 # Light above this is divided by a power of two first: its squares would leave float32.
 BRIGHT = 1e15
@@ -134,20 +133,17 @@ def write_light(
     image: Any,
     error: Any | None = None,
 ) -> Run:
-    """The three passes over the pixels, and what happens on blocks between them.
+    """The passes over the pixels, and what happens on blocks between them.
 
     Writes `image`, `(H, W, C)`, and, if it is given, the standard error to `error`, `(H, W, 1)`.
     """
-    block = method.finest
-    count, channels, w = channel_count(guides), target.shape[2], -(-target.shape[1] // (2 * block))
-    shift = centre(context, guides)
-    moments = collect(context, target, guides, shift, 2 * block, weight, light=True)
-    mean = frame_mean(context, moments, w, count, channels)
-    run = Run(context, count, channels, numbers_of(method), shift, mean)
-    pilot = fit_pilot(run, moments, w, block)
-    grid = collect_weighted(run, target, guides, pilot, weight, block)
+    block, shift, numbers = method.finest, centre(context, guides), numbers_of(method)
+    run = Run(context, channel_count(guides), target.shape[2], numbers, shift, None)
+    collect = collect_blocks if isinstance(method, Auto) else collect_pixels
+    run, light, grid = collect(run, (target, guides, weight), block)
+    w = -(-target.shape[1] // (2 * block))
     steps, merged = fit_levels(run, grid, block, method.levels)
-    scale, own = restore(run, merged, moments, w), own_light(run, merged, grid)
+    scale, own = restore(run, merged, light, w), own_light(run, merged, grid)
     restored = Restored(*scale, own, run.numbers.floor)
     apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
     if error is not None:
@@ -155,13 +151,14 @@ def write_light(
     return run
 
 
-def fit_pilot(run: Run, moments: Any, w: int, block: int) -> Grid:
-    """Models of the brightness on blocks of 4 `block`, from the moments of pass 1.
-
-    moments: `(K, h, pitch)`, of one channel, with w columns.
-    """
-    run = run._replace(channels=1)
-    return fit_level(run, halve_planes(run, moments, w), 4 * block).models
+def collect_pixels(run: Run, images: Images, block: int) -> tuple[Run, Any, Grid]:
+    """Passes 1 and 2; all as of `collect_blocks`."""
+    target, guides, weight = images
+    light = collect(run.context, target, guides, run.shift, 2 * block, weight, light=True)
+    w = -(-target.shape[1] // (2 * block))
+    run = run._replace(mean=frame_mean(run.context, light, w, run.guides, run.channels))
+    pilot = fit_pilot(run, light, w, block)
+    return run, light, collect_weighted(run, target, guides, pilot, weight, block)
 
 
 def fit_levels(run: Run, moments: Grid, block: int, levels: int) -> tuple[list[Step], Grid]:
@@ -175,8 +172,10 @@ def fit_levels(run: Run, moments: Grid, block: int, levels: int) -> tuple[list[S
     coarse = fit_level(run, grids[-1], block << (levels - 1))
     steps, merged = list[Step](), coarse.models
     for level in reversed(range(levels - 1)):
-        fine = fit_level(run, grids[level], block << level, merged, slopes=level > 0)
+        grid, spared = grids[level], level == 0 and steps and run.numbers.worth is not None
+        tiles = choose(run, steps[-1].share, *grid.sizes[:2]) if spared else None
+        fine = fit_level(run, grid, block << level, merged, slopes=level > 0, tiles=tiles)
         steps.append(Step(fine, coarse, signal_share(run, fine, coarse)))
-        merged = merge(run, fine.models, coarse.models, merged, steps[-1].share)
+        merged = merge(run, fine, coarse, merged, steps[-1].share)
         coarse = fine
     return steps, merged

@@ -7,9 +7,10 @@ from jflnr.checks import one_sentence
 from jflnr.network.flnr import DEFAULT, FLNR
 from jflnr.network.picture import PictureFLNR
 from jflnr.opencl import network
-from jflnr.opencl.adaptive import Images, flr_adaptive, run_on_images, write_light
+from jflnr.opencl.adaptive import flr_adaptive, run_on_images, write_light
 from jflnr.opencl.context import Context
 from jflnr.opencl.energy import rescale
+from jflnr.opencl.grids import Images
 
 
 @one_sentence

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.level import brightness
 from jflnr.regression.window import REACH
 
+# The light, the guides and what each pixel counts, on the device.
+Images: TypeAlias = "tuple[Any, tuple[Any, ...], Any | None]"
 # Neighbours whose planes lie together.
 GROUP = 8
 
@@ -77,6 +79,12 @@ class Run(NamedTuple):
         h, pitch = grid.size
         size = (h, pitch // width) if down else (pitch // width, h)
         self.context.run(name, file, everywhere | defines, size, arguments)
+
+
+def lanes_of(run: Run, block: int) -> int:
+    """Pixels that are worked on together: of two blocks side by side, or what divides one."""
+    both = run.context.width(2 * block)
+    return both if both == 2 * block else run.context.width(block)
 
 
 @functools.cache

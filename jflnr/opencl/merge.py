@@ -1,8 +1,21 @@
 """Host side of kernels_cl/merge.cl; its twin in JAX is jflnr/regression/merge.py."""
 
-from jflnr.opencl.grids import Grid, Run
+from typing import Any
+
+import numpy as np
+
+from jflnr.opencl.grids import GROUP, Grid, Run
 from jflnr.opencl.level import Level, new_models
 from jflnr.opencl.resampling import halve
+
+
+def choose(run: Run, share: Grid, h: int, w: int) -> Any:
+    """The tiles of the finest grid, of h x w blocks, that are refined: see
+    `jflnr.regression.multiscale.chosen`. Returns `(ceil(h / GROUP), pitch / GROUP)`, uint8."""
+    tiles = run.context.empty((-(-h // GROUP), -(-w // GROUP)), np.uint8)
+    arguments = *share.sizes, tiles.shape[1], run.numbers.worth, share.planes, tiles
+    run.launch("choose", "merge.cl", share, arguments)
+    return tiles
 
 
 def signal_share(run: Run, fine: Level, coarse: Level) -> Grid:
@@ -27,20 +40,21 @@ def _signal(run: Run, fine: Level, coarse: Level) -> Grid:
     h, w, pitch = fine.models.sizes
     signal = run.grid(3, h, w)
     arguments = (
-        h, pitch, *coarse.models.sizes, run.numbers.guide_scale, run.mean, fine.moments.planes,
-        fine.features.planes, fine.models.planes, coarse.models.planes, signal.planes,
+        h, pitch, *coarse.models.sizes, run.numbers.guide_scale, fine.tiles, run.mean,
+        fine.moments.planes, fine.features.planes, fine.models.planes, coarse.models.planes,
+        signal.planes,
     )  # fmt: skip
     run.launch("signal", "merge.cl", signal, arguments)
     return signal
 
 
-def merge(run: Run, fine: Grid, coarse: Grid, merged: Grid, share: Grid) -> Grid:
+def merge(run: Run, fine: Level, coarse: Level, merged: Grid, share: Grid) -> Grid:
     """Models `merged + share (fine - coarse)` on the finer grid."""
-    h, w, pitch = fine.sizes
+    h, w, pitch = fine.models.sizes
     result = new_models(run, h, w)
     arguments = (
-        h, pitch, *coarse.sizes, fine.planes, coarse.planes, merged.planes, share.planes,
-        result.planes,
+        h, pitch, *coarse.models.sizes, fine.tiles, fine.models.planes, coarse.models.planes,
+        merged.planes, share.planes, result.planes,
     )  # fmt: skip
-    run.launch("merge", "merge.cl", fine, arguments)
+    run.launch("merge", "merge.cl", result, arguments)
     return result

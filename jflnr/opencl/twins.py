@@ -19,6 +19,7 @@ from jflnr.stages import Known, Parts, compose
 REGRESSIONS: dict[str, Callable[..., Any]] = {
     "FLR": flr,
     "AdaptiveFLR": flr_adaptive,
+    "Auto": flr_adaptive,
     "FLNR": flnr,
     "WholePicture": flr_adaptive,
     "PictureFLNR": picture_light,

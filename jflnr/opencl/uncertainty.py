@@ -26,7 +26,7 @@ def standard_error(
         h, w, pitch = fine.models.sizes
         after = run.grid(2, h, w)
         arguments = (
-            h, pitch, *coarse.models.sizes, fine.moments.planes, fine.models.planes,
+            h, pitch, *coarse.models.sizes, fine.tiles, fine.moments.planes, fine.models.planes,
             coarse.models.planes, share.planes, None if before is None else before.planes,
             after.planes,
         )  # fmt: skip

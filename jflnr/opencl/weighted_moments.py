@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from jflnr.opencl.grids import Grid, Run, brightness_defines
+from jflnr.opencl.grids import Grid, Run, brightness_defines, lanes_of
 from jflnr.opencl.moments import guide_arguments, pixel_defines
 from jflnr.regression.moments import plane_count
 
@@ -18,9 +18,7 @@ def collect_weighted(
     height, width, channels = target.shape
     h, w = -(-height // block), -(-width // block)
     moments = run.grid(plane_count(run.guides, channels) + 1, h, w)
-    # Two blocks, or what divides one.
-    lanes = run.context.width(2 * block)
-    lanes = lanes if lanes == 2 * block else run.context.width(block)
+    lanes = lanes_of(run, block)
     pitch = moments.size[1]
     defines = {**pixel_defines(target, guides, weight, block), **brightness_defines(channels)}
     defines["WIDTH"] = lanes

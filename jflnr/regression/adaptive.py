@@ -20,7 +20,7 @@ from jflnr.regression import energy
 from jflnr.regression.apply import apply
 from jflnr.regression.arguments import channel_count, check_options, check_regression
 from jflnr.regression.floor import with_own_light
-from jflnr.regression.level import Grid, brightness, fit_level, mean_guides
+from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides
 from jflnr.regression.moments import (
     Guides,
     centre,
@@ -30,7 +30,7 @@ from jflnr.regression.moments import (
     index_xy,
     unit_of,
 )
-from jflnr.regression.multiscale import fit_levels, merged_models
+from jflnr.regression.multiscale import TILE, Step, fit_levels, merged_models
 from jflnr.regression.resampling import halve
 from jflnr.regression.uncertainty import DETAIL, block_error
 from jflnr.regression.window import REACH
@@ -52,6 +52,8 @@ class AdaptiveFLR:
     caution: factor on the noise that is expected in what a finer level adds.
     slack: share by which the mean brightness may differ from the input's.
     floor: least brightness of a pixel, relative to what its model gives the whole block.
+    worth: the finest models are fitted only where of what the next coarser ones added more than
+    this share is signal; everywhere if None.
     block: side in pixels of the blocks of pass 1; the finest models have half of it. levels: number
     of grids, each twice as coarse. keep_energy: give every frame exactly the mean brightness of its
     input, instead of nearly. with_error: tell the standard error of the result too.
@@ -76,6 +78,7 @@ class AdaptiveFLR:
     caution: jax.Array | float = 1.0
     slack: jax.Array | float = 0.025
     floor: jax.Array | float = 0.2
+    worth: jax.Array | float | None = None
     block: int = field(default=8, metadata={"static": True})
     levels: int = field(default=4, metadata={"static": True})
     keep_energy: bool = field(default=False, metadata={"static": True})
@@ -125,8 +128,8 @@ class AdaptiveFLR:
             fit_models,
             (("models", side), ("output", 2 * side), *[("block_error", side)] * self.tells_error),
             ("moments", "light"),
-            reach=reach_of(self.levels) * side,
-            align=side << (self.levels - 1),
+            reach=(reach_of(self.levels) + TILE * (self.worth is not None)) * side,
+            align=max(side << (self.levels - 1), TILE * side),
             totals=(("kept", 2 * side),),
             learn=learn_rate,
         )
@@ -140,7 +143,7 @@ class AdaptiveFLR:
 
 
 def reach_of(levels: int) -> int:
-    """How many of its own blocks the finest fit looks beyond a block.
+    """How many of its own blocks the finest fit looks beyond a block, or beyond its tile.
 
     On every level `REACH` for its window, over fits that follow the coarser level; for the share of
     signal as many of twice the size, with one for what is halved and one for what is interpolated.
@@ -186,9 +189,13 @@ def collect_light(method: Any, parts: Parts, known: Known) -> Parts:
     """Pass 1: unweighted moments of the brightness, on blocks of twice the finest."""
     light = light_of(parts["target"], known["unit"])[..., None]
     images = light, parts["guides"], known["shift"]
-    moments = collect(*images, 2 * method.finest, parts["weight"])
-    own = moments[index_xy(0, 0, known["shift"].size, 1)]
-    return {"light": moments, "counted": jnp.stack([moments[0], own])}
+    return counted(collect(*images, 2 * method.finest, parts["weight"]), known["shift"].size)
+
+
+def counted(light: jax.Array, guides: int) -> Parts:
+    """Moments of the brightness, and its planes whose sums over the frame are wanted."""
+    own = light[index_xy(0, 0, guides, 1)]
+    return {"light": light, "counted": jnp.stack([light[0], own])}
 
 
 def learn_mean(method: Any, known: Known, sums: Parts) -> Known:
@@ -223,18 +230,23 @@ def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
 def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """All levels: models `(Q + 2, C, h, w)`, the last row from `floor.with_own_light`; the
     brightness that they give blocks twice as large; and, asked for, their error."""
-    shift, light, moments = known["shift"], parts["light"], parts["moments"]
-    grid = Grid(moments[:-1], moments[-1:], method.finest)
-    channels = channels_of(grid.moments, shift.size)
-    levels = fit_levels(grid, shift, channels, method.levels, known["mean"], method)
+    light, moments, count = parts["light"], parts["moments"], known["shift"].size
+    levels = levels_of(method, moments, known)
     models = merged_models(*levels)
-    output = energy.block_light(models, light, shift.size)
+    output = energy.block_light(models, light, count)
     given = {
-        "models": with_own_light(models, mean_guides(grid.moments, shift.size)),
+        "models": with_own_light(models, mean_guides(moments[:-1], count)),
         "output": output,
         "kept": jnp.stack([light[0] * output, light[0] * output**2]),
     }
     return given | ({"block_error": block_error(*levels)} if method.tells_error else {})
+
+
+def levels_of(method: AdaptiveFLR, moments: jax.Array, known: Known) -> tuple[Fit, list[Step]]:
+    """`fit_levels`, from the weighted moments and one plane of their noise."""
+    grid, shift = Grid(moments[:-1], moments[-1:], method.finest), known["shift"]
+    channels = channels_of(grid.moments, shift.size)
+    return fit_levels(grid, shift, channels, method.levels, known["mean"], method)
 
 
 def learn_rate(method: Any, known: Known, sums: Parts) -> Known:
@@ -289,6 +301,13 @@ def light_of(target: jax.Array, unit: jax.Array | float = 1) -> jax.Array:
     return sum((w * (target[..., c] / unit) for c, w in enumerate(weights)))
 
 
+def weight_of(expected: jax.Array, mean: jax.Array, numbers: Any) -> jax.Array:
+    """What a place weighs whose brightness is expected to be so much: one over its variance."""
+    # The bound is there for the logarithm; written so, the power takes a quarter of the time.
+    relative = jnp.log(jnp.maximum(expected / mean, 1e-6))
+    return 1 / (jnp.exp(numbers.exponent * relative) + numbers.offset)
+
+
 def _weights(
     light: jax.Array,
     guides: Guides,
@@ -303,9 +322,7 @@ def _weights(
     light, expected: `(H, W)`.
     Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
     """
-    # The bound is there for the logarithm; written so, the power takes a quarter of the time.
-    relative = jnp.log(jnp.maximum(expected / mean, 1e-6))
-    weights = 1 / (jnp.exp(numbers.exponent * relative) + numbers.offset)
+    weights = weight_of(expected, mean, numbers)
     usable = jnp.isfinite(light)
     for layer in jax.tree.leaves(guides):
         usable &= jnp.all(jnp.isfinite(layer), axis=-1)

@@ -17,7 +17,7 @@ def signal_share(
     reference: jax.Array,
     caution: jax.Array | float,
 ) -> jax.Array:
-    """The share of signal in the difference d between two levels, `(h, w)` in [0, 1].
+    """The share of signal in the difference d between two levels, in [0, 1], on the coarser grid.
 
     If the coarser window were unbiased it would be the efficient estimate, and the variance of d
     would be the difference N of the two variances (Hausman 1978). What mean(d^2) over the
@@ -28,7 +28,6 @@ def signal_share(
     the coarser grid, over which d^2 and N are averaged. reference: `(h, w)`, a squared brightness
     that both are relative to. caution: factor on N.
     """
-    height, width = reference.shape
     regressors = mean_guides(grid.moments, fine.coefficients.shape[0] - 1)
     difference = predict(fine.coefficients - coarse.coefficients, regressors)
     noise = jnp.maximum(fine.variance - coarse.variance, 0)
@@ -38,8 +37,7 @@ def signal_share(
     # Means: far from all light the squares of sums, in the derivative, are too small for float32.
     inverse = divide(1, count, 1e-12)
     power, noise = power * inverse, noise * inverse
-    share = jnp.maximum(power - caution * noise, 0) / jnp.maximum(power, 1e-9)
-    return double(share, height, width)
+    return jnp.maximum(power - caution * noise, 0) / jnp.maximum(power, 1e-9)
 
 
 def interpolate(fit: Fit, height: int, width: int) -> Fit:

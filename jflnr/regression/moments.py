@@ -116,12 +116,12 @@ def collect(
 
     target: `(H, W, C)`. guides: `(H, W, Q)`. shift: `(Q,)`, from `centre`. weight: `(H, W)`,
     numbers or a boolean mask, or None; pixels of weight 0, and any that are not finite, are left
-    out. brightness: `(C,)`, weights of the channels; if given, the mean square of the brightness is
-    one more plane, the last.
+    out. brightness: `(C,)`, weights of the channels; if given, the mean squares of the brightness
+    and of the weight are two more planes, the last.
     Returns `(K, ceil(H/block), ceil(W/block))`.
     """
     height, width = (-(-size // block) for size in target.shape[:2])
-    count = plane_count(shift.size, target.shape[2]) + (brightness is not None)
+    count = plane_count(shift.size, target.shape[2]) + 2 * (brightness is not None)
     whole = target.shape[0] // block
     # 24 rows of pixels stay in the cache while their products are formed, and keep cores busy;
     # where they do not divide the frame, fewer: a second program for the rest would compile longer.
@@ -171,7 +171,7 @@ def _strip_moments(
         light = sum(
             (b * plane for b, plane in zip(brightness, y, strict=True)), jnp.zeros_like(one)
         )
-        products.append(one * light * (light * block**2))
+        products += [one * light * (light * block**2), one * one * (1 / block**2)]
     divided = np.arange(len(products)) >= len(weighted) * (len(weighted) + 1) // 2
     # Rows first: contiguous additions; then the columns, with an eighth of the data.
     sums = lax.optimization_barrier([jnp.sum(product, axis=0) for product in products])

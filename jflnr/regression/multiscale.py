@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING, NamedTuple
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
 from jflnr.regression.merge import interpolate, signal_share
-from jflnr.regression.resampling import double
+from jflnr.regression.resampling import double, halve
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
+
+
+# Side of the tiles that are refined or not, in blocks of the finest grid.
+TILE = 8
 
 
 class Step(NamedTuple):
     """One level finer than what was known before.
 
     fine: its fit. coarse: that of the coarser level, on this grid. luminance: `(h, w)`, brightness
-    known before. share: `(h, w)`, how much of their difference is signal. merged: models
+    known before. share: on the coarser grid, how much of their difference is signal. merged: models
     `(Q + 1, C, h, w)` with that share added.
     """
 
@@ -50,9 +54,27 @@ def fit_levels(
     coarsest = fit_level(grids[-1], shift, channels, mean, numbers)
     last, steps = (coarsest, coarsest.coefficients), list[Step]()
     for grid in reversed(grids[:-1]):
-        steps.append(refine(grid, *last, shift.size, mean, numbers, fit))
+        where = None
+        if grid is grids[0] and steps and numbers.worth is not None:
+            where = chosen(steps[-1].share, numbers.worth, *grid.moments.shape[1:])
+        steps.append(refine(grid, *last, shift.size, mean, numbers, fit, where))
         last = steps[-1].fine, steps[-1].merged
     return coarsest, steps
+
+
+def in_tiles(share: jax.Array) -> jax.Array:
+    """Means over the tiles of the share of signal in the step before the finest, `(h, w)`."""
+    return (halve(share[None]) / halve(jnp.ones_like(share)[None]))[0]
+
+
+def chosen(share: jax.Array, worth: jax.Array | float, height: int, width: int) -> jax.Array:
+    """Whether a block of the finest grid, `(height, width)`, lies in a tile that is refined.
+
+    Those are all where more than `worth` of what the step before added was signal: where that was
+    noise, what is finer still is noise too. share: of that step.
+    """
+    where = in_tiles(share) > worth
+    return jnp.repeat(jnp.repeat(where, TILE, 0), TILE, 1)[:height, :width]
 
 
 def refine(
@@ -63,11 +85,13 @@ def refine(
     mean: jax.Array,
     numbers: AdaptiveFLR,
     fit: Callable[[Grid, jax.Array, Fit], Fit],
+    where: jax.Array | None = None,
 ) -> Step:
     """One level finer: its own fit, and what is merged so far with its share added.
 
     coarse, merged: of the coarser grid. fit: makes the models of this one, from what must be alike
-    inside a window, `(F, h, w)`, and the coarser fit on this grid.
+    inside a window, `(F, h, w)`, and the coarser fit on this grid. where: `(h, w)`, from
+    `chosen`; elsewhere nothing is added.
     """
     size, window = grid.moments.shape[1:], coarse.window
     coarse, merged = interpolate(coarse, *size), double(merged, *size)
@@ -77,6 +101,9 @@ def refine(
     features = jnp.concatenate([guide_features(grid, guides, numbers), edge[None]])
     fine = fit(grid, features, coarse)
     reference = luminance**2 + 0.01 * mean**2
+    if where is not None:
+        models = jnp.where(where, fine.coefficients, coarse.coefficients)
+        fine = Fit(models, jnp.where(where, fine.variance, coarse.variance), fine.window)
     share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
-    merged = merged + share * (fine.coefficients - coarse.coefficients)
+    merged = merged + double(share, *size) * (fine.coefficients - coarse.coefficients)
     return Step(grid, fine, coarse, luminance, share, merged)

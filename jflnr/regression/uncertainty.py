@@ -38,12 +38,13 @@ class Error(NamedTuple):
         The increments from level to level do not correlate, and of an increment with noise N of
         which the Wiener filter keeps a share, the expected squared error is share N.
         """
-        size, count = step.share.shape, step.merged.shape[0] - 1
+        size, count = step.luminance.shape, step.merged.shape[0] - 1
+        share = double(step.share, *size)
         noise = jnp.maximum(step.fine.variance - step.coarse.variance, 0)
         change = step.fine.coefficients - step.coarse.coefficients
-        dropped = (1 - step.share) * predict(change, mean_guides(step.grid.moments, count))
+        dropped = (1 - share) * predict(change, mean_guides(step.grid.moments, count))
         variance, left_out = (double(part, *size) for part in self)
-        return Error(variance + step.share * noise, left_out + dropped**2)
+        return Error(variance + share * noise, left_out + dropped**2)
 
     def square(self) -> jax.Array:
         """The expected squared error, `(h, w)`, but for `DETAIL`."""

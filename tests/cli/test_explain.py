@@ -1,6 +1,6 @@
 """`jflnr denoise --method auto --explain`: what it prints, and the map it writes.
 
-Denoising and planning are stood in for; what they do is tested in tests/auto.
+Denoising is stood in for; what it does is tested in tests/regression.
 """
 
 from pathlib import Path
@@ -10,41 +10,28 @@ import pytest
 from PIL import Image
 
 from jflnr import denoising
-from jflnr.auto import method
-from jflnr.auto.plan import Plan
 from jflnr.cli import main
 from jflnr.frame import Frame
+from jflnr.regression import auto
 
 
-@pytest.fixture
-def planned(monkeypatch: pytest.MonkeyPatch) -> Plan:
-    """A plan for the frame of 40 x 24: its left half needs no guide, its right half all."""
-    order = np.zeros((3, 5))
-    order[:, 3:] = 3
-    decibels = {"blocks-8": 25.0, "blocks-4": 25.5}
-    cost = {"blocks-8": 1.0, "blocks-4": 1.5}
-    plan = Plan("blocks-8", ("normal", "ao"), decibels, cost, 12.0, order, 8, 3)
-    monkeypatch.setattr(method, "plan_of", lambda *arguments: plan)
+def test_tells_what_was_refined_and_writes_its_map(
+    tmp_path: Path,
+    frame_file: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(auto, "signal_in_tiles", lambda *_: (np.array([[0.1, 0.9]]), 32))
     half = lambda _, frame: 0.5 * frame.indirect
     monkeypatch.setattr(denoising.Denoiser, "__call__", half)
-    return plan
-
-
-def test_tells_the_plan_and_writes_its_map(
-    planned: Plan, tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
     out = tmp_path / "out.exr"
     assert main(["denoise", str(frame_file), "-o", str(out), "--method", "auto", "--explain"]) == 0
     told = capsys.readouterr()
-    text = told.out + told.err
-    assert "blocks-8 with normal, ao, 25.0 dB predicted, 12 ms" in text
-    assert "blocks-4 +0.5 dB for x 1.5" in text
-    assert "0: 60%, 1: 0%, 2: 0%, 3: 40%" in text
+    assert "refined: 20% of the frame, in tiles of 32 pixels" in told.out + told.err
     picture = np.asarray(Image.open(tmp_path / "out.plan.png")).astype(int)
     assert picture.shape == (24, 40, 3)
-    left, right = picture[:, :24], picture[:, 24:]
-    assert (left == left[0, 0]).all()
-    assert (right == right[0, 0]).all()
+    left, right = picture[:, :32], picture[:, 32:]
+    assert (left == left[0, 0]).all() and (right == right[0, 0]).all()
     assert right[0, 0].sum() > left[0, 0].sum() + 300
 
 

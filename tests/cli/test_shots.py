@@ -191,7 +191,6 @@ Refusal = Callable[[Path, Path], list[object]]
         (lambda shot, state: [shot, "--history", shot / NAMES[0]], "would replace an input"),
         (lambda shot, state: [shot, "--history", state, "--block", "4"], "--block"),
         (lambda shot, state: [shot, "--history", state, "--backend", "opencl"], "jax backend"),
-        (lambda shot, state: [shot, "--method", "auto"], "by themselves"),
         (
             lambda shot, state: [shot, "--method", "bmfr", "--guides", "normal", "--overwrite"],
             "own features",

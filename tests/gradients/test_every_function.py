@@ -7,7 +7,6 @@ import pytest
 from jax import random
 
 from experiments.peers import paper_network as paper
-from jflnr.auto import nested
 from jflnr.bmfr import fit as bmfr_fit
 from jflnr.bmfr import pipeline as bmfr
 from jflnr.bmfr import taa as bmfr_taa
@@ -16,7 +15,6 @@ from jflnr.images.noisy_guides import smooth_guide
 from jflnr.network import flnr as networks
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.elimination import cholesky_solve
-from jflnr.regression.energy import rescale, restore
 from jflnr.regression.flr import FLR
 from jflnr.regression.moments import collect, collect_weighted, plane_count
 from jflnr.regression.resampling import double, halve
@@ -85,17 +83,9 @@ STEPS = {
         lambda m, p: solve(m, jnp.full(16, 0.1), FLR(*jnp.exp(p)), 1),
         (moments_of(16, 1, 1, 1), LOGARITHMS),
     ),
-    "orders of models": (
-        lambda m, e, n: nested.fit_orders(m, jnp.asarray(SHIFT), (e, e), n, (1, 1), 1),
-        (moments_of(2, 1, 2, 3), positive(2, 3), 0.01 * positive(2, 3)),
-    ),
     "smoothing of a guide": (
         smooth_guide,
         (positive(*SIZE, 1), normal(*SIZE, 3) / 9, 5 + positive(*SIZE, 1) / 9),
-    ),
-    "energy": (
-        lambda c, m, image, light: (restore(c, m, 2, 0.01), rescale(image, light, None)),
-        (positive(3, 3, 4, 6), moments_of(2, 1, 2, 3), positive(*SIZE, 3), positive(*SIZE)),
     ),
     "FLNR of the paper": (
         lambda y, x, w, p: paper.flnr_of_paper(y, x, w, FLR(*jnp.exp(p), block=2, support=12)),

@@ -117,7 +117,6 @@ def test_a_wrong_tile_is_named(frame):
     "method, backend, message",
     [
         ("bmfr", "jax", "method bmfr does not work in tiles"),
-        ("auto", "jax", "method auto does not work in tiles"),
         ("flnr", "opencl", "flnr on opencl needs the whole frame in memory: .* jax backend$"),
     ],
 )

@@ -14,6 +14,7 @@ from jflnr.network import unet
 from jflnr.network.features import Read
 from jflnr.network.flnr import FLNR, gains, init
 from jflnr.regression.adaptive import AdaptiveFLR, reach_of
+from jflnr.regression.auto import Auto
 from jflnr.regression.flr import FLR
 from jflnr.stages import Stage
 
@@ -67,8 +68,9 @@ def talkative(widths: tuple[int, ...]) -> unet.Params:
         (FLR(sigma=5.0, block=4, support=14), 160),
         (AdaptiveFLR(block=2), 256),
         (AdaptiveFLR(block=4, levels=2, with_error=True), 256),
+        (Auto(block=2, levels=3), 256),
     ],
-    ids=["flr", "flr, narrow", "flr-adaptive", "flr-adaptive, error"],
+    ids=["flr", "flr, narrow", "flr-adaptive", "flr-adaptive, error", "auto"],
 )
 def test_what_is_beyond_the_reach_changes_nothing(method: Any, width: int) -> None:
     found = list(runs(method, width))

@@ -135,8 +135,6 @@ def test_errors() -> None:
         temporal.step(state, dataclasses.replace(frame, motion=None))
     with pytest.raises(ValueError, match="method must be one of flr"):
         temporal.step(state, frame, "svgf")
-    with pytest.raises(ValueError, match="auto denoises frames by themselves"):
-        temporal.step(state, frame, "auto")
     with pytest.raises(TypeError, match="flr has no levels"):
         temporal.step(state, frame, levels=3)
     with pytest.raises(ValueError, match="another size"):
