@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import completion, denoise, devices, fit, info, metrics, report, train
+from jflnr.cli import completion, denoise, doctor, fit, info, metrics, report, train
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence, tinted
 
 EXAMPLES = """\
@@ -28,7 +28,7 @@ COMMANDS = {
     "report": report,
     "fit": fit,
     "train": train,
-    "devices": devices,
+    "doctor": doctor,
     "completion": completion,
 }
 

@@ -28,7 +28,7 @@ class Context:
 
     Threads may share one: their kernels run one after another. A forked process may not.
 
-    device: a `pyopencl.Device`, its number or a part of its name (see `jflnr devices`), or None
+    device: a `pyopencl.Device`, its number or a part of its name (see `jflnr doctor`), or None
     for the best one. work_group: number of work-items in x of a work-group; results do not depend
     on it. Raises `NoDevice` or `ValueError`.
     """
