@@ -5,9 +5,9 @@ them the whole picture is denoised, of our own, and by any method but `picture`,
 light. Each output holds the picture as plain R, G, B (and A where the input has it), and indirect
 light that was denoised, demodulated, as the layer `indirect`.
 
-OUT is a file when IN is one file and OUT ends with .exr; otherwise it is a folder, and each output
-has its input's name. An output that exists is kept, which is no error, unless --overwrite is given.
-A frame that fails is reported, and the others are still done.
+OUT is a file when IN is one file and OUT ends with .exr or .pfm; otherwise it is a folder, and each
+output has its input's name; - is standard input or output. An output that exists is kept, which is
+no error, unless --overwrite is given. A frame that fails is reported, and the others are still done.
 
 With --temporal a folder is a shot: its frames are denoised in the order of their numbers, each with
 what the ones before it left.
@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from jflnr import layouts
-from jflnr.cli import shots
+from jflnr.cli import shots, streams
 from jflnr.cli.common import add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
 from jflnr.cli.jobs import Job, check_apart, plan
@@ -37,12 +37,15 @@ EXAMPLES = """\
   jflnr denoise room.exr -o out/ --method auto --explain    what each frame needs, and why
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
+  jflnr denoise --hdr color.pfm --alb albedo.pfm --nrm normal.pfm -o out.pfm    as OIDN's command
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("inputs", metavar="IN", nargs="+", type=Path, help="EXR frames, or folders of them")
+    add("inputs", metavar="IN", nargs="*", type=Path, help="EXR frames, or folders of them, or -")
+    for option, layer in {"hdr": "picture", **streams.OF_OIDN}.items():
+        add(f"--{option}", metavar="FILE", type=Path, help=f"the {layer}, PFM or EXR, as of OIDN")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="file or folder to write")
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
@@ -106,6 +109,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    with streams.as_files(arguments) as of_files:
+        return _run(of_files, arguments.output == streams.STREAM)
+
+
+def _run(arguments: argparse.Namespace, piped: bool) -> int:
+    """piped: whether stdout is for the picture."""
     from tqdm import tqdm
 
     from jflnr.large import memory
@@ -113,7 +122,8 @@ def run(arguments: argparse.Namespace) -> int:
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
     check_apart([arguments.history], [*outputs, *(job.source for job in jobs)])
-    check_apart([*outputs, arguments.history], [arguments.params])
+    read = [arguments.params, arguments.alb, arguments.nrm]
+    check_apart([*outputs, arguments.history], read)
     bound = memory.parse(arguments.memory) if arguments.memory else None
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()
@@ -130,7 +140,7 @@ def run(arguments: argparse.Namespace) -> int:
             bar.update()
             for line in remarks(record, arguments.quiet):
                 bar.write(line, file=err)
-            if not arguments.json and "error" not in record:
+            if not (arguments.json or piped or "error" in record):
                 bar.write(summary(record, arguments.verbose), file=out)
         if arguments.verbose and arguments.cluster is None:
             seconds = time.perf_counter() - start
