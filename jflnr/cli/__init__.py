@@ -1,7 +1,8 @@
 """The command `jflnr`: one file per subcommand.
 
-Exit codes: 0 done, 2 something is wrong with what was asked or given, 130 interrupted. Modules here
-import numerical code inside the functions that run it, so that `--help` and `info` answer at once.
+Exit codes: 0 done, 2 something is wrong with what was asked or given, 3 some frames failed, 130
+interrupted. Modules here import numerical code inside the functions that run it, so that `--help`
+and `info` answer at once.
 """
 
 import argparse

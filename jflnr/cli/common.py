@@ -13,6 +13,9 @@ from typing import Any, TextIO
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
 INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
 
+# The exit code where some frames failed and others are done.
+SOME_FAILED = 3
+
 COLOURS = {"red": 31, "yellow": 33}
 
 

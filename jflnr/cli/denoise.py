@@ -7,7 +7,8 @@ light that was denoised, demodulated, as the layer `indirect`.
 
 OUT is a file when IN is one file and OUT ends with .exr or .pfm; otherwise it is a folder, and each
 output has its input's name; - is standard input or output. An output that exists is kept, which is
-no error, unless --overwrite is given. A frame that fails is reported, and the others are still done.
+no error, unless --overwrite is given. Of a frame that fails it is said why, the others are still
+done, and the exit code is 3.
 
 With --temporal a folder is a shot: its frames are denoised in the order of their numbers, each with
 what the ones before it left.
@@ -15,18 +16,21 @@ what the ones before it left.
 
 import argparse
 import dataclasses
+import os
 import time
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
+from typing import TextIO
 
 from jflnr import layouts
 from jflnr.cli import shots, streams
-from jflnr.cli.common import add_map, guide_names, to_json, voices
+from jflnr.cli.common import SOME_FAILED, add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
 from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
-from jflnr.cli.summary import remarks, summary, throughput
+from jflnr.cli.summary import Remarks, summary, throughput
 from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
@@ -90,8 +94,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the picture only, also the denoised light (default), or all of the input too",
     )
     add("--reference", action="store_true", help="print metrics against the layer `reference`")
+    add("--fail-below", type=float, metavar="DB", help="a frame of less PSNR fails (--reference)")
     add("--overwrite", action="store_true", help="replace outputs that exist")
     add("--json", action="store_true", help="print one JSON list instead of lines")
+    add("--log", type=Path, metavar="FILE", help="add what is said to FILE, with the time")
     add("--profile", action="store_true", help="print the time of every OpenCL kernel")
     add("--memory", metavar="SIZE", help="denoise in pieces what takes more, as 4G (half the free)")
     add(
@@ -121,33 +127,43 @@ def _run(arguments: argparse.Namespace, piped: bool) -> int:
 
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
-    check_apart([arguments.history], [*outputs, *(job.source for job in jobs)])
-    read = [arguments.params, arguments.alb, arguments.nrm]
-    check_apart([*outputs, arguments.history], read)
+    written = [*outputs, arguments.history, arguments.log]
+    check_apart([arguments.history, arguments.log], [*outputs, *(job.source for job in jobs)])
+    check_apart(written, [arguments.params, arguments.alb, arguments.nrm])
     bound = memory.parse(arguments.memory) if arguments.memory else None
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()
     worker = Worker(settings_of(arguments), arguments, bound, min(len(jobs), 3))
-    records, start = [], time.perf_counter()
+    records, remarks, start = [], Remarks(arguments.quiet), time.perf_counter()
     with (
         voices() as (out, err),
+        open(arguments.log or os.devnull, "a", buffering=1, errors="backslashreplace") as log,
         tqdm(
             total=len(jobs), unit="frame", disable=arguments.quiet or None, leave=False, file=err
         ) as bar,
     ):
+
+        def say(line: str, stream: TextIO) -> None:
+            bar.write(line, file=stream)
+            log.write(f"{datetime.now().isoformat(' ', 'seconds')} {line}\n")
+
         for record in _records(worker, jobs, arguments):
             records.append(record)
             bar.update()
-            for line in remarks(record, arguments.quiet):
-                bar.write(line, file=err)
+            for line in remarks.of(record):
+                say(line, err)
             if not (arguments.json or piped or "error" in record):
-                bar.write(summary(record, arguments.verbose), file=out)
+                say(summary(record, arguments.verbose), out)
+        for line in remarks.repeated():
+            say(line, err)
         if arguments.verbose and arguments.cluster is None:
             seconds = time.perf_counter() - start
-            bar.write(throughput(records, worker.exr_seconds, seconds), file=err)
+            say(throughput(records, worker.exr_seconds, seconds), err)
     if arguments.json:
-        print(to_json(records))
-    return 2 if any("error" in record for record in records) else 0
+        places = {str(job.source): place for place, job in enumerate(jobs)}
+        print(to_json(sorted(records, key=lambda record: places[record["input"]])))
+    failed = sum("error" in record for record in records)
+    return 0 if not failed else SOME_FAILED if failed < len(records) else 2
 
 
 def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:

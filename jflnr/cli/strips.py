@@ -71,8 +71,10 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile", "lobes"):
-        if getattr(arguments, option):
-            raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
+    for option in ("png", "reference", "fail_below", "profile", "lobes"):
+        if getattr(arguments, option) not in (None, False):
+            raise ValueError(
+                f"--{option.replace('_', '-')} needs the whole frame in memory: raise --memory"
+            )
     if arguments.channels == "all":
         raise ValueError("--channels all needs the whole frame in memory: raise --memory")

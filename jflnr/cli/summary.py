@@ -1,19 +1,42 @@
 """What `jflnr denoise` says of one frame, from the record of it that `--json` prints."""
 
+import re
 import sys
+from collections import Counter
 from typing import Any
 
 from jflnr.cli.common import kept_as_it_is, metrics_table, printable, profile_table, tinted
 
 
-def remarks(record: dict[str, Any], quiet: bool) -> list[str]:
-    """Lines for stderr."""
-    warning = tinted("warning:", "yellow", sys.stderr)
-    found = [] if quiet else record.get("warnings", ())
-    lines = [f"jflnr: {warning} {printable(record['input'])}: {printable(text)}" for text in found]
-    if "error" in record:
-        lines.append(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}")
-    return lines
+class Remarks:
+    """Lines for stderr. A warning that many frames have, but for its numbers, is told once."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.quiet = quiet
+        self.texts: dict[str, str] = {}
+        self.counts = Counter[str]()
+
+    def of(self, record: dict[str, Any]) -> list[str]:
+        """What is to be said of a frame."""
+        lines = []
+        for text in () if self.quiet else record.get("warnings", ()):
+            kind = re.sub(r"[\d.,]+", "0", text)
+            if not self.counts[kind]:
+                lines.append(self._warning(record["input"], text))
+            self.texts.setdefault(kind, text)
+            self.counts[kind] += 1
+        if "error" in record:
+            lines.append(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}")
+        return lines
+
+    def repeated(self) -> list[str]:
+        """How many more frames each warning was of."""
+        more = {kind: count - 1 for kind, count in self.counts.items() if count > 1}
+        return [self._warning(f"{n} more", self.texts[kind]) for kind, n in more.items()]
+
+    def _warning(self, what: str, text: str) -> str:
+        warning = tinted("warning:", "yellow", sys.stderr)
+        return f"jflnr: {warning} {printable(what)}: {printable(text)}"
 
 
 def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: float) -> str:

@@ -21,8 +21,8 @@ def find(
     """The channels of the `layers` that the user maps; those of other files are added.
 
     A value is a layer of the file, channels with commas between them, or `FILE.exr` or `FILE.pfm`,
-    seen from the folder of `path`, with `:` and one of those after it; `{stem}` in it is the stem of
-    `path`.
+    seen from the folder of `path`, with `:` and one of those after it; `{stem}` in it is the stem
+    of `path`.
     Raises ValueError if there is no such thing, and OSError as `read_channels` does.
     """
     found = {}

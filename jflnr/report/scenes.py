@@ -1,6 +1,6 @@
 """What a page compares: one frame, or pictures without one, in several versions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,33 +61,49 @@ def of_frame(
     return Scene(name, images, frame, direct or {})
 
 
-def collect(paths: Sequence[Path], spp: int, reference: Path | None) -> list[Scene]:
+def collect(
+    paths: Sequence[Path],
+    spp: int,
+    reference: Path | None,
+    layers: Mapping[str, str] | None = None,
+) -> list[Scene]:
     """Read files of any kind and put together what belongs together.
 
-    A frame starts a scene, with its noisy light `indirect_{spp}` and its reference. What
-    `jflnr denoise` wrote joins the one frame there is or, of several, the one whose name it has.
-    Without frames, plain R, G, B are compared, against those of the file `reference`.
+    A frame starts a scene, with its noisy light `indirect_{spp}` and its reference, or, of another
+    program, with its picture. What `jflnr denoise` wrote joins the one frame there is or, of
+    several, the one whose name it has. Without frames, plain R, G, B are compared. Pictures are
+    measured against that of the file `reference`. layers: of frames, as of `read_frame`.
     Raises OSError and ValueError, in one sentence, for what cannot be compared.
     """
     channels = {path: exr.read_channels(path) for path in paths}
     frames = [path for path in paths if not _is_picture(channels[path])]
     pictures = [path for path in paths if path not in frames]
     if not frames:
-        return [_plain(pictures, channels, reference)]
-    if reference is not None:
-        raise ValueError(f"--reference is for plain pictures, and {frames[0]} is a frame")
+        name = paths[0].stem if len(paths) == 1 else "pictures"
+        return [Scene(name, _plain(_names(pictures), channels, reference))]
     owners = {path: _owner(path, frames) for path in pictures}
     scenes = []
     for source in frames:
         names = _names([path for path in pictures if owners[path] == source], source.stem)
         exr.check_aligned(source, *names)
+        frame = read_frame(source, spp, layers)
+        if frame.beauty is not None:
+            images = _plain({source: NOISY} | names, channels, reference)
+            if frame.reference is not None:
+                images.setdefault(REFERENCE, np.asarray(frame.reference))
+            scenes.append(Scene(source.stem, images))
+            continue
+        if reference is not None:
+            raise ValueError(
+                f"--reference is for pictures, and {source} is a frame: --map reference=FILE"
+            )
         lights = {name: _light(channels[path], path, "indirect") for path, name in names.items()}
         direct = {
             name: _light(channels[path], path, "direct")
             for path, name in names.items()
             if "direct.R" in channels[path]
         }
-        scenes.append(of_frame(source.stem, read_frame(source, spp), lights, direct))
+        scenes.append(of_frame(source.stem, frame, lights, direct))
     return scenes
 
 
@@ -96,13 +112,15 @@ def _is_picture(channels: dict[str, np.ndarray]) -> bool:
     return "indirect.R" in channels or set(channels) <= set("RGBA")
 
 
-def _plain(paths: Sequence[Path], channels: dict, reference: Path | None) -> Scene:
-    names = _names(paths)
-    exr.check_aligned(*paths, *([] if reference is None else [reference]))
+def _plain(
+    names: Mapping[Path, str], channels: Mapping[Path, dict], reference: Path | None
+) -> dict[str, np.ndarray]:
+    """The pictures of files by their names, and that of the file `reference`."""
+    exr.check_aligned(*names, *([] if reference is None else [reference]))
     images = {name: layouts.picture(channels[p], str(p)) for p, name in names.items()}
     if reference is not None:
         images[REFERENCE] = layouts.picture(exr.read_channels(reference), str(reference))
-    return Scene(paths[0].stem if len(paths) == 1 else "pictures", images)
+    return images
 
 
 def _owner(path: Path, frames: Sequence[Path]) -> Path:
