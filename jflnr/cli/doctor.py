@@ -1,14 +1,16 @@
 """doctor: say what this machine has, what is missing, and how long one frame takes.
 
 Lists versions, the devices that JAX and OpenCL see (the first OpenCL device is the one that
---backend opencl uses), where compiled programs are kept, and denoises the shipped frame.
+--backend opencl uses), where compiled programs are kept, and denoises the shipped frame by `flr`.
 """
 
 import argparse
 import importlib.util
+import itertools
 import os
 import platform
 import time
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -36,103 +38,66 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.opencl.devices import NoDevice
 
-    found, missing = _jax(), _lacking()
+    found, missing = [], [*_lacking()]
     try:
-        found += _opencl()
+        for device in _devices():
+            found.append(device)
     except NoDevice as error:
         missing.insert(0, str(error))
-    facts = {
-        "versions": {"python": platform.python_version()} | _versions(),
+    there = {each.name: each.version for each in metadata.distributions()}
+    versions = {name: there[name] for name in PACKAGES if name in there}
+    facts: dict[str, Any] = {
+        "versions": {"python": platform.python_version()} | versions,
         "devices": found,
-        "caches": _caches(),
-        "frame": [_seconds(name) for name in dict.fromkeys(row["backend"] for row in found)],
+        "caches": [*_caches()],
+        "frame": [_times(name) for name in dict.fromkeys(row["backend"] for row in found)],
         "missing": missing,
     }
-    print(to_json(facts) if arguments.json else as_text(facts))
+    if arguments.json:
+        print(to_json(facts))
+        return 0
+    print(", ".join(f"{name} {version}" for name, version in facts["versions"].items()))
+    for rows in (facts["devices"], facts["caches"], facts["frame"]):
+        cells = [[*map(str, row.values())] for row in rows]
+        print(f"\n{table([list(rows[0]), *cells], left=4)}" if rows else "")
+    print("", *missing, sep="\n")
     return 0
 
 
-def as_text(facts: dict[str, Any]) -> str:
-    """The facts for a person."""
-    columns = ("backend", "device", "kind", "driver")
-    devices = [columns, *([row[name] for name in columns] for row in facts["devices"])]
-    caches = [("programs of", "folder", "MB")]
-    caches += [(c["backend"], c["folder"], f"{c['bytes'] / 1e6:.1f}") for c in facts["caches"]]
-    times = [("the shipped frame", "ms", "the first time, s")]
-    times += [
-        (row["backend"], f"{1e3 * row['seconds']:.0f}", f"{row['first_seconds']:.1f}")
-        for row in facts["frame"]
-    ]
-    parts = [
-        ", ".join(f"{name} {version}" for name, version in facts["versions"].items()),
-        table(devices, left=4),
-        table(caches, left=2),
-        table(times),
-        *facts["missing"],
-    ]
-    return "\n\n".join(parts)
-
-
-def _versions() -> dict[str, str]:
-    there = {each.name: each.version for each in metadata.distributions()}
-    return {name: there[name] for name in PACKAGES if name in there}
-
-
-def _jax() -> list[dict[str, str]]:
+def _devices() -> Iterator[dict[str, str]]:
+    """What JAX and OpenCL see; ends with `NoDevice` if that is no OpenCL device."""
     import jax
 
-    return [
-        {
-            "backend": "jax",
-            "device": f"{device.platform}:{device.id}",
-            "kind": device.device_kind,
-            "driver": f"jax {jax.__version__}",
-        }
-        for device in jax.devices()
-    ]
-
-
-def _opencl() -> list[dict[str, str]]:
     from jflnr.opencl.devices import all_devices, kind
 
-    return [
-        {
-            "backend": "opencl",
-            "device": f"{number}: {device.name.strip()}",
-            "kind": kind(device),
-            "driver": device.version.strip(),
-        }
-        for number, device in enumerate(all_devices())
-    ]
+    found = [(f"{d.platform}:{d.id}", d.device_kind, jax.__version__) for d in jax.devices()]
+    for name, what, driver in found:
+        yield {"backend": "jax", "device": name, "kind": what, "driver": driver}
+    for number, device in enumerate(all_devices()):
+        label, driver = f"{number}: {device.name.strip()}", device.version.strip()
+        yield {"backend": "opencl", "device": label, "kind": kind(device), "driver": driver}
 
 
-def _caches() -> list[dict[str, Any]]:
+def _caches() -> Iterator[dict[str, Any]]:
     """Where compiled programs are kept, and how large that is."""
     from jflnr.opencl import kept
 
     folders = {"jax": os.environ.get("JAX_COMPILATION_CACHE_DIR"), "opencl": kept.folder()}
-    return [
-        {
-            "backend": name,
-            "folder": str(folder),
-            "bytes": sum(path.stat().st_size for path in Path(folder).glob("*") if path.is_file()),
-        }
-        for name, folder in folders.items()
-        if folder
-    ]
+    for name, folder in folders.items():
+        if folder:
+            size = sum(path.stat().st_size for path in Path(folder).glob("*") if path.is_file())
+            yield {"programs of": name, "folder": str(folder), "bytes": size}
 
 
-def _lacking() -> list[str]:
+def _lacking() -> Iterator[str]:
     """A line for each module that is not there, with the command that brings it."""
-    return [
-        f"{use} needs {module}: pip install '{package}'"
-        for module, (use, package) in OPTIONAL.items()
-        if importlib.util.find_spec(module) is None
-    ]
+    for module, (use, package) in OPTIONAL.items():
+        if importlib.util.find_spec(module) is None:
+            yield f"{use} needs {module}: pip install '{package}'"
 
 
-def _seconds(backend: str) -> dict[str, Any]:
-    """How long one frame takes by `flr`, and how long the first one did, with all that it loads."""
+def _times(backend: str) -> dict[str, Any]:
+    """How long one frame takes, and how long the first one did, with all that it loads."""
     from jflnr.denoising import SHIPPED_FRAME, Denoiser
     from jflnr.frame import read_frame
 
@@ -141,5 +106,5 @@ def _seconds(backend: str) -> dict[str, Any]:
     for _ in range(2):
         denoiser(frame)
         times.append(time.perf_counter())
-    seconds, first = times[2] - times[1], times[1] - times[0]
-    return {"backend": backend, "seconds": seconds, "first_seconds": first}
+    first, later = (round(1e3 * (b - a), 1) for a, b in itertools.pairwise(times))
+    return {"one frame by": backend, "ms": later, "ms of the first": first}

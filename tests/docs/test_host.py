@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from docs.launches import launches, parameters, tables
 from jflnr.opencl import NoDevice
-from jflnr.opencl.launches import launches, parameters, tables
 from jflnr.regression.flr import DEFAULT, flr
 
 ROOT = Path(__file__).parents[2]

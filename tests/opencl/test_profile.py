@@ -43,7 +43,7 @@ def test_doctor(context: Context, capsys: pytest.CaptureFixture[str]) -> None:
     assert context.device.name.strip() in text and str(kept.folder()) in text
     assert main(["doctor", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert [row["backend"] for row in facts["frame"]] == ["jax", "opencl"]
+    assert [row["one frame by"] for row in facts["frame"]] == ["jax", "opencl"]
     kept_bytes = {row["folder"]: row["bytes"] for row in facts["caches"]}[str(kept.folder())]
     assert kept_bytes == sum(path.stat().st_size for path in kept.folder().iterdir())
 

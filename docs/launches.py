@@ -1,6 +1,6 @@
 """What the host code launches, as tables for who writes another host (docs/opencl_engine.md):
 
-python -m jflnr.opencl.launches flr-adaptive 640 360
+python docs/launches.py flr-adaptive 640 360
 """
 
 import re
