@@ -217,7 +217,7 @@ class Worker:
 
             record["plan"] = explain(job.explanation, frame, self.settings["guides"])
         if measured:
-            noisy, clean = frame.indirect, result.lights.get("indirect")
+            noisy, clean = frame.indirect, result.light
             if frame.beauty is not None:
                 noisy, clean = frame.beauty, result.picture
             images = {"noisy": noisy, "denoised": clean}

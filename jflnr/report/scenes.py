@@ -1,7 +1,7 @@
 """What a page compares: one frame, or pictures without one, in several versions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,11 @@ class Scene:
 
     With a `frame` they are demodulated indirect light, without one radiance. The version called
     `reference`, if there is one, is what the others are measured against, and comes last.
-    `direct` is the direct light of versions that have one of their own instead of the frame's.
     """
 
     name: str
     images: dict[str, np.ndarray]
     frame: Frame | None = None
-    direct: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         checks.same_size(**self.images, frame=self.frame and self.frame.albedo)
@@ -48,17 +46,12 @@ class Scene:
         return metrics.measure(self.frame, self.images[name])
 
 
-def of_frame(
-    name: str,
-    frame: Frame,
-    lights: dict[str, np.ndarray],
-    direct: dict[str, np.ndarray] | None = None,
-) -> Scene:
+def of_frame(name: str, frame: Frame, lights: dict[str, np.ndarray]) -> Scene:
     """The frame's noisy light, the denoised `lights`, and its reference if it has one."""
     images = {NOISY: np.asarray(frame.indirect), **lights}
     if frame.reference is not None:
         images[REFERENCE] = np.asarray(frame.reference)
-    return Scene(name, images, frame, direct or {})
+    return Scene(name, images, frame)
 
 
 def collect(
@@ -97,13 +90,8 @@ def collect(
             raise ValueError(
                 f"--reference is for pictures, and {source} is a frame: --map reference=FILE"
             )
-        lights = {name: _light(channels[path], path, "indirect") for path, name in names.items()}
-        direct = {
-            name: _light(channels[path], path, "direct")
-            for path, name in names.items()
-            if "direct.R" in channels[path]
-        }
-        scenes.append(of_frame(source.stem, frame, lights, direct))
+        lights = {name: _light(channels[path], path) for path, name in names.items()}
+        scenes.append(of_frame(source.stem, frame, lights))
     return scenes
 
 
@@ -147,10 +135,10 @@ def _names(paths: Sequence[Path], frame: str | None = None) -> dict[Path, str]:
     return {path: str(path) for path in paths}
 
 
-def _light(channels: dict[str, np.ndarray], path: Path, layer: str) -> np.ndarray:
+def _light(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
     if "indirect.R" not in channels:
         raise ValueError(
             f"{path} holds no layer indirect, so that it cannot be compared with a frame; "
             "leave the frame out to compare plain pictures"
         )
-    return layouts.layer(channels, layer, tuple(f"{layer}.{c}" for c in "RGB"), str(path))
+    return layouts.layer(channels, "indirect", tuple(f"indirect.{c}" for c in "RGB"), str(path))
