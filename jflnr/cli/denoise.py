@@ -18,6 +18,7 @@ import argparse
 import dataclasses
 import os
 import time
+from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
@@ -25,12 +26,12 @@ from typing import TextIO
 
 from jflnr import layouts
 from jflnr.cli import shots, streams
-from jflnr.cli.common import SOME_FAILED, add_map, guide_names, to_json, voices
+from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
 from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
-from jflnr.cli.summary import Remarks, summary, throughput
+from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
 from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
@@ -134,7 +135,7 @@ def _run(arguments: argparse.Namespace, piped: bool) -> int:
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()
     worker = Worker(settings_of(arguments), arguments, bound, min(len(jobs), 3))
-    records, remarks, start = [], Remarks(arguments.quiet), time.perf_counter()
+    records, told, start = [], Counter[str](), time.perf_counter()
     with (
         voices() as (out, err),
         open(arguments.log or os.devnull, "a", buffering=1, errors="backslashreplace") as log,
@@ -143,27 +144,32 @@ def _run(arguments: argparse.Namespace, piped: bool) -> int:
         ) as bar,
     ):
 
-        def say(line: str, stream: TextIO) -> None:
-            bar.write(line, file=stream)
-            log.write(f"{datetime.now().isoformat(' ', 'seconds')} {line}\n")
+        def say(line: str, stream: TextIO | None) -> None:
+            if stream is not None:
+                bar.write(line, file=stream)
+            plain = COLOUR.sub("", line)
+            log.write(f"{datetime.now().isoformat(' ', 'seconds')} {plain}\n")
 
+        loud, results = None if arguments.quiet else err, None if arguments.json or piped else out
         for record in _records(worker, jobs, arguments):
             records.append(record)
             bar.update()
-            for line in remarks.of(record):
-                say(line, err)
-            if not (arguments.json or piped or "error" in record):
-                say(summary(record, arguments.verbose), out)
-        for line in remarks.repeated():
-            say(line, err)
+            for line in remarks(record, told):
+                say(line, loud)
+            if "error" in record:
+                say(failed(record), err)
+            else:
+                say(summary(record, arguments.verbose), results)
+        for line in repeated(told):
+            say(line, loud)
         if arguments.verbose and arguments.cluster is None:
             seconds = time.perf_counter() - start
             say(throughput(records, worker.exr_seconds, seconds), err)
     if arguments.json:
         places = {str(job.source): place for place, job in enumerate(jobs)}
         print(to_json(sorted(records, key=lambda record: places[record["input"]])))
-    failed = sum("error" in record for record in records)
-    return 0 if not failed else SOME_FAILED if failed < len(records) else 2
+    good = sum("error" not in record for record in records)
+    return 0 if good == len(records) else SOME_FAILED if good else 2
 
 
 def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:

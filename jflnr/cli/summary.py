@@ -3,40 +3,33 @@
 import re
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 from jflnr.cli.common import kept_as_it_is, metrics_table, printable, profile_table, tinted
 
 
-class Remarks:
-    """Lines for stderr. A warning that many frames have, but for its numbers, is told once."""
+def remarks(record: dict[str, Any], told: Counter[str]) -> Iterator[str]:
+    """Warnings of one frame that are new. told: how often each has come, whatever its numbers."""
+    for text in record.get("warnings", ()):
+        told[kind := re.sub(r"[\d.,]*\d", "N", text)] += 1
+        if told[kind] == 1:
+            yield _warning(record["input"], text)
 
-    def __init__(self, quiet: bool) -> None:
-        self.quiet = quiet
-        self.texts: dict[str, str] = {}
-        self.counts = Counter[str]()
 
-    def of(self, record: dict[str, Any]) -> list[str]:
-        """What is to be said of a frame."""
-        lines = []
-        for text in () if self.quiet else record.get("warnings", ()):
-            kind = re.sub(r"[\d.,]+", "0", text)
-            if not self.counts[kind]:
-                lines.append(self._warning(record["input"], text))
-            self.texts.setdefault(kind, text)
-            self.counts[kind] += 1
-        if "error" in record:
-            lines.append(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}")
-        return lines
+def repeated(told: Counter[str]) -> Iterator[str]:
+    """How many more frames each warning was of."""
+    yield from (_warning(f"{n - 1} more", kind) for kind, n in told.items() if n > 1)
 
-    def repeated(self) -> list[str]:
-        """How many more frames each warning was of."""
-        more = {kind: count - 1 for kind, count in self.counts.items() if count > 1}
-        return [self._warning(f"{n} more", self.texts[kind]) for kind, n in more.items()]
 
-    def _warning(self, what: str, text: str) -> str:
-        warning = tinted("warning:", "yellow", sys.stderr)
-        return f"jflnr: {warning} {printable(what)}: {printable(text)}"
+def _warning(what: str, text: str) -> str:
+    warning = tinted("warning:", "yellow", sys.stderr)
+    return f"jflnr: {warning} {printable(what)}: {printable(text)}"
+
+
+def failed(record: dict[str, Any]) -> str:
+    """Why a frame failed, for stderr."""
+    return f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}"
 
 
 def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: float) -> str:
