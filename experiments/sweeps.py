@@ -273,10 +273,6 @@ def _without(path: Path, name: str) -> Frame:
     return data.but(frame, **{name: np.ascontiguousarray(same)})
 
 
-# Of the OpenCL kernels: 9 channels.
-MOST = {"jax": 8, "opencl": 3}
-
-
 def _lightgroups() -> list[Case]:
     return [
         Case(
@@ -293,7 +289,6 @@ def _lightgroups() -> list[Case]:
         )
         for backend in backends()
         for count in (1, 2, 3, 4, 5, 6, 8)
-        if count <= MOST[backend]
     ]
 
 

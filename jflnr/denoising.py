@@ -124,7 +124,7 @@ def backend_for(backend: str, method: Any, tile: int | None = None) -> str:
 class Denoiser:
     """A method made ready once, called frame by frame.
 
-    Arguments as of `denoise`. device: of the opencl backend, as `jflnr devices` numbers or names
+    Arguments as of `denoise`. device: of the opencl backend, as `jflnr doctor` numbers or names
     it, or a `jflnr.opencl.Context`; the best one if None. Called with a frame it returns what
     `denoise` does; `next` takes the frames of a shot in their order. `backend` is what runs it.
     """

@@ -2,6 +2,7 @@
 
 Layers are split at the last dot (`albedo.R` is channel R of layer `albedo`). A channel of a
 multi-part file keeps its name when that holds a layer; otherwise its part's name is the layer.
+A file called `.pfm` is read and written as plain R, G, B in that format.
 Whatever is wrong with a file is raised as OSError or ValueError, in one sentence.
 """
 
@@ -20,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import OpenEXR
 
+from jflnr import pfm
 from jflnr.files import replacing
 
 PathLike = str | os.PathLike[str]
@@ -76,6 +78,10 @@ def layers_of(channels: Iterable[str]) -> dict[str, list[str]]:
 
 def read_attributes(path: PathLike) -> Attributes:
     """Comments, compression and windows of the file's first part, without its pixels."""
+    if pfm.named(Path(path)):
+        channels = read_channels(path)
+        size = next(iter(channels.values())).shape
+        return Attributes("", "NO", 1, Window(), {}, size, tuple(channels))
     with _opened(Path(path)) as (parts, _):
         header = parts[0].header
     (x0, y0), (x1, y1) = header["dataWindow"]
@@ -98,6 +104,9 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
     Raises OSError when there is no such file, ValueError when it cannot be used.
     """
     path = Path(path)
+    if pfm.named(path):
+        _check_there(path)
+        return pfm.read(path)
     with _opened(path) as (announced, read):
         for part in announced:
             _check_header(path, part)
@@ -139,6 +148,8 @@ def write_channels(
     check_sizes(path, channels)
     if wrong := [f"{n} is {a.dtype}" for n, a in channels.items() if a.dtype.name not in TYPES]:
         raise TypeError(f"channels must be {', '.join(TYPES)}; {wrong[0]}")
+    if pfm.named(path):
+        return pfm.write(path, np.stack([channels[name] for name in "RGB"], axis=-1))
     size = next(iter(channels.values())).shape
     computed = all(pixels.dtype == np.float32 for pixels in channels.values())
     compression = OpenEXR.NO_COMPRESSION if computed else OpenEXR.ZIP_COMPRESSION
@@ -299,13 +310,17 @@ def latin_1(name: str) -> str:
     return name if name.isprintable() else name.encode(errors="surrogateescape").decode("latin-1")
 
 
-def _check_file(path: Path) -> None:
+def _check_there(path: Path) -> None:
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such file")
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a folder, not an EXR file")
     if not path.is_file():
         raise OSError(f"{path} is a pipe or a device, not an EXR file")
+
+
+def _check_file(path: Path) -> None:
+    _check_there(path)
     try:
         with path.open("rb") as file:
             start = file.read(len(MAGIC))

@@ -40,7 +40,8 @@ def display(picture: np.ndarray, scale: float) -> np.ndarray:
 
 
 def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
-    """All metrics of demodulated `indirect` (H, W, 3) against the frame's own reference.
+    """All metrics of demodulated `indirect` (H, W, 3) against the frame's own reference; of a frame
+    with a `beauty`, of a picture against another.
 
     The reference has noise of its own, which `mse` contains and `mse_unbiased` does not; that one
     needs the half reference `reference_a`, and may come out negative where the error is small.
@@ -50,6 +51,8 @@ def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
         raise ValueError("the frame has no layer reference to measure against")
     checks.image("indirect", indirect, 3)
     checks.same_size(indirect=indirect, reference=frame.reference)
+    if frame.beauty is not None:
+        return compare(indirect, frame.reference)
     albedo, reference = _float64(frame.albedo), _float64(frame.reference)
     with np.errstate(invalid="ignore"):  # black times infinite
         x, y = albedo * _float64(indirect), albedo * reference

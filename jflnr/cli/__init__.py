@@ -1,7 +1,8 @@
 """The command `jflnr`: one file per subcommand.
 
-Exit codes: 0 done, 2 something is wrong with what was asked or given, 130 interrupted. Modules here
-import numerical code inside the functions that run it, so that `--help` and `info` answer at once.
+Exit codes: 0 done, 2 something is wrong with what was asked or given, 3 some frames failed, 130
+interrupted. Modules here import numerical code inside the functions that run it, so that `--help`
+and `info` answer at once.
 """
 
 import argparse
@@ -13,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import completion, denoise, devices, fit, info, metrics, report, train
+from jflnr.cli import completion, denoise, doctor, fit, info, metrics, report, train
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence, tinted
 
 EXAMPLES = """\
@@ -28,7 +29,7 @@ COMMANDS = {
     "report": report,
     "fit": fit,
     "train": train,
-    "devices": devices,
+    "doctor": doctor,
     "completion": completion,
 }
 

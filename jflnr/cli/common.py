@@ -5,6 +5,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +14,10 @@ from typing import Any, TextIO
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
 INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
 
-COLOURS = {"red": 31, "yellow": 33}
+# The exit code where some frames failed and others are done.
+SOME_FAILED = 3
+
+COLOURS, COLOUR = {"red": 31, "yellow": 33}, re.compile("\033\\[\\d*m")
 
 
 def sentence(error: BaseException) -> str:

@@ -27,13 +27,13 @@ def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
 class Result(NamedTuple):
     """What became of a frame.
 
-    picture: `(H, W, 3)`. lights: denoised light, `(H, W, 3)`, by layer. lit: the picture without
-    what shines by itself. alpha: `(H, W, 1)` if it was denoised too. error: `(H, W, 1)`, of the
-    brightness, and passes: `(H, W, C)`, light passes, if asked for.
+    picture: `(H, W, 3)`. light: `(H, W, 3)`, denoised, if that was what was denoised. lit: the
+    picture without what shines by itself. alpha: `(H, W, 1)` if it was denoised too. error: `(H, W,
+    1)`, of the brightness, and passes: `(H, W, C)`, light passes, if asked for.
     """
 
     picture: np.ndarray
-    lights: dict[str, np.ndarray]
+    light: np.ndarray | None
     lit: np.ndarray
     alpha: np.ndarray | None = None
     error: np.ndarray | None = None
@@ -52,12 +52,12 @@ def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
             shining = shining + seen * frame.environment
         picture, alpha = image[..., :3], image[..., 3:] if image.shape[-1] > 3 else None
         others = given.get("error"), given.get("passes")
-        return Result(picture, {}, picture - shining, alpha, *others)
+        return Result(picture, None, picture - shining, alpha, *others)
     picture, lit = (
         np.asarray(composite(some, image), np.float32)
         for some in (frame, dataclasses.replace(frame, emission=None))
     )
-    return Result(picture, {"indirect": image}, lit, error=given.get("error"))
+    return Result(picture, image, lit, error=given.get("error"))
 
 
 def channels_of(
@@ -65,7 +65,7 @@ def channels_of(
 ) -> dict[str, np.ndarray]:
     """What to write."""
     mask = None if frame.mask is None else np.asarray(frame.mask)
-    images = result.picture, result.lights, mask, result.alpha, result.passes
+    images = result.picture, result.light, mask, result.alpha, result.passes
     channels = layouts.output_channels(source, *images, arguments.channels)
     return channels if result.error is None else channels | {"error.Y": result.error[..., 0]}
 

@@ -5,9 +5,10 @@ them the whole picture is denoised, of our own, and by any method but `picture`,
 light. Each output holds the picture as plain R, G, B (and A where the input has it), and indirect
 light that was denoised, demodulated, as the layer `indirect`.
 
-OUT is a file when IN is one file and OUT ends with .exr; otherwise it is a folder, and each output
-has its input's name. An output that exists is kept, which is no error, unless --overwrite is given.
-A frame that fails is reported, and the others are still done.
+OUT is a file when IN is one file and OUT ends with .exr or .pfm; otherwise it is a folder, and each
+output has its input's name; - is standard input or output. An output that exists is kept, which is
+no error, unless --overwrite is given. Of a frame that fails it is said why, the others are still
+done, and the exit code is 3.
 
 With --temporal a folder is a shot: its frames are denoised in the order of their numbers, each with
 what the ones before it left.
@@ -15,18 +16,22 @@ what the ones before it left.
 
 import argparse
 import dataclasses
+import os
 import time
+from collections import Counter
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
+from typing import TextIO
 
 from jflnr import layouts
-from jflnr.cli import shots
-from jflnr.cli.common import add_map, guide_names, to_json, voices
+from jflnr.cli import shots, streams
+from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
 from jflnr.cli.jobs import Job, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
-from jflnr.cli.summary import remarks, summary, throughput
+from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
 from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
@@ -37,12 +42,15 @@ EXAMPLES = """\
   jflnr denoise room.exr -o out/ --method auto --explain    where each frame is refined
   jflnr denoise a.exr -o b.exr --map albedo=diffuse.colour --map depth=Z
   jflnr denoise room.exr -o out/ --reference    metrics before and after
+  jflnr denoise --hdr color.pfm --alb albedo.pfm --nrm normal.pfm -o out.pfm    as OIDN's command
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("inputs", metavar="IN", nargs="+", type=Path, help="EXR frames, or folders of them")
+    add("inputs", metavar="IN", nargs="*", type=Path, help="EXR frames, or folders of them, or -")
+    for option, layer in {"hdr": "picture", **streams.OF_OIDN}.items():
+        add(f"--{option}", metavar="FILE", type=Path, help=f"the {layer}, PFM or EXR, as of OIDN")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="file or folder to write")
     add("--spp", type=int, default=1, metavar="N", help="take the noisy layer indirect_N (1)")
     add_map(parser)
@@ -87,8 +95,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the picture only, also the denoised light (default), or all of the input too",
     )
     add("--reference", action="store_true", help="print metrics against the layer `reference`")
+    add("--fail-below", type=float, metavar="DB", help="a frame of less PSNR fails (--reference)")
     add("--overwrite", action="store_true", help="replace outputs that exist")
     add("--json", action="store_true", help="print one JSON list instead of lines")
+    add("--log", type=Path, metavar="FILE", help="add what is said to FILE, with the time")
     add("--profile", action="store_true", help="print the time of every OpenCL kernel")
     add("--memory", metavar="SIZE", help="denoise in pieces what takes more, as 4G (half the free)")
     add(
@@ -106,38 +116,60 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    with streams.as_files(arguments) as of_files:
+        return _run(of_files, arguments.output == streams.STREAM)
+
+
+def _run(arguments: argparse.Namespace, piped: bool) -> int:
+    """piped: whether stdout is for the picture."""
     from tqdm import tqdm
 
     from jflnr.large import memory
 
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
-    check_apart([arguments.history], [*outputs, *(job.source for job in jobs)])
-    check_apart([*outputs, arguments.history], [arguments.params])
+    written = [*outputs, arguments.history, arguments.log]
+    check_apart([arguments.history, arguments.log], [*outputs, *(job.source for job in jobs)])
+    check_apart(written, [arguments.params, arguments.alb, arguments.nrm])
     bound = memory.parse(arguments.memory) if arguments.memory else None
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()
     worker = Worker(settings_of(arguments), arguments, bound, min(len(jobs), 3))
-    records, start = [], time.perf_counter()
+    records, told, start = [], Counter[str](), time.perf_counter()
     with (
         voices() as (out, err),
+        open(arguments.log or os.devnull, "a", buffering=1, errors="backslashreplace") as log,
         tqdm(
             total=len(jobs), unit="frame", disable=arguments.quiet or None, leave=False, file=err
         ) as bar,
     ):
+
+        def say(line: str, stream: TextIO | None) -> None:
+            if stream is not None:
+                bar.write(line, file=stream)
+            plain = COLOUR.sub("", line)
+            log.write(f"{datetime.now().isoformat(' ', 'seconds')} {plain}\n")
+
+        loud, results = None if arguments.quiet else err, None if arguments.json or piped else out
         for record in _records(worker, jobs, arguments):
             records.append(record)
             bar.update()
-            for line in remarks(record, arguments.quiet):
-                bar.write(line, file=err)
-            if not arguments.json and "error" not in record:
-                bar.write(summary(record, arguments.verbose), file=out)
+            for line in remarks(record, told):
+                say(line, loud)
+            if "error" in record:
+                say(failed(record), err)
+            else:
+                say(summary(record, arguments.verbose), results)
+        for line in repeated(told):
+            say(line, loud)
         if arguments.verbose and arguments.cluster is None:
             seconds = time.perf_counter() - start
-            bar.write(throughput(records, worker.exr_seconds, seconds), file=err)
+            say(throughput(records, worker.exr_seconds, seconds), err)
     if arguments.json:
-        print(to_json(records))
-    return 2 if any("error" in record for record in records) else 0
+        places = {str(job.source): place for place, job in enumerate(jobs)}
+        print(to_json(sorted(records, key=lambda record: places[record["input"]])))
+    good = sum("error" not in record for record in records)
+    return 0 if good == len(records) else SOME_FAILED if good else 2
 
 
 def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:

@@ -175,10 +175,11 @@ class Worker:
             return _record(job) | denoise_in_strips(job, self._another(tile=tile), arguments, tile)
         denoiser = self.denoiser_for(frame, tile)
         method = denoiser.method_for(frame)
-        if arguments.reference and (frame.reference is None or method.name in PICTURES):
+        measured = arguments.reference or arguments.fail_below
+        if measured and frame.reference is None:
             raise ValueError(
-                f"{job.source}: --reference needs a layer reference, and there is none for what "
-                f"{method.name} denoises"
+                f"{job.source}: --reference needs a layer reference: of a whole picture --map "
+                "reference=FILE, another picture"
             )
         shapes = tuple((name, image.shape) for name, image in frame.layers().items())
         times = [time.perf_counter()]
@@ -217,9 +218,17 @@ class Worker:
             record["plan"] = explain(
                 job.explanation, frame, self.settings["method"], self.settings["guides"]
             )
-        if arguments.reference:
-            images = {"noisy": frame.indirect, "denoised": result.lights["indirect"]}
-            record["metrics"] = {name: measure(frame, image) for name, image in images.items()}
+        if measured:
+            noisy, clean = frame.indirect, result.light
+            if frame.beauty is not None:
+                noisy, clean = frame.beauty, result.picture
+            images = {"noisy": noisy, "denoised": clean}
+            record["metrics"] = {
+                name: measure(frame, np.asarray(image)) for name, image in images.items()
+            }
+            psnr, least = record["metrics"]["denoised"]["psnr"], arguments.fail_below
+            if least and not psnr >= least:
+                raise ValueError(f"{job.source}: its PSNR of {psnr:.2f} dB is below {least:g}")
         return Denoised(job, source, frame, result, about, record)
 
     def _given(self, frame: "Frame", tile: int | None) -> Given:

@@ -12,7 +12,7 @@ import numpy as np
 
 from jflnr import exr, layouts
 from jflnr.cli.common import add_map, printable, table, to_json
-from jflnr.methods import PICTURES, default_of
+from jflnr.methods import AUTO, PICTURES, default_of, method_of
 
 EXAMPLES = """\
   jflnr info render.exr
@@ -101,9 +101,9 @@ def _use(source: layouts.Source) -> dict[str, Any]:
         images = layouts.assemble(source)
     except ValueError as error:
         return use | {"usable": False, "why": str(error)}
+    from jflnr.denoising import backend_for
     from jflnr.frame import Frame
     from jflnr.images.inputs import guides_of
-    from jflnr.methods import method_of
 
     frame = Frame(**images)  # type: ignore[arg-type]
     method = default_of(frame)
@@ -115,6 +115,7 @@ def _use(source: layouts.Source) -> dict[str, Any]:
     return use | {
         "usable": True,
         "method": method,
+        "backend": backend_for(AUTO, method_of(method)),
         "spp": layouts.native.spp_present(source.channels),
         "light": "beauty" if whole else layout.light,
         "pixels": pixels,
@@ -139,7 +140,7 @@ def _use_text(use: dict[str, Any]) -> list[str]:
     denoised = "denoised picture" if whole else "denoised indirect"
     return [
         f"layout: {use['layout']}; jflnr denoise would use",
-        f"  method       {use['method']}, if no other is named",
+        f"  method       {use['method']}, if no other is named, by {use['backend']}",
         f"  noisy light  {', '.join(noisy)}",
         f"  pixels       {use['pixels']} will be denoised",
         f"  guides       {', '.join(_named(name, use['channels']) for name in use['guides'])}",

@@ -8,12 +8,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-PICTURES = (".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".tif", ".tiff")
+# What a frame can be written as, and what it cannot.
+FILES = (".exr", ".pfm")
+PICTURES = (".png", ".jpg", ".jpeg", ".hdr", ".tif", ".tiff")
 
 
 @dataclass(frozen=True)
 class Job:
-    """One frame to read, and the EXR to write."""
+    """One frame to read, and the file to write."""
 
     source: Path
     target: Path
@@ -48,13 +50,15 @@ def natural(path: Path) -> list[tuple[float, str]]:
 
 
 def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
-    """One job per frame, its EXR apart from all that is read; raises ValueError."""
+    """One job per frame, its output apart from all that is read; raises ValueError."""
     files = expand(inputs)
-    as_file = output.suffix.lower() == ".exr" and not output.is_dir()
+    as_file = output.suffix.lower() in FILES and not output.is_dir()
     if as_file and (len(inputs) > 1 or inputs[0].is_dir()):
         raise ValueError(f"{output}: OUT must be a folder when there are several frames")
     if not as_file and output.suffix.lower() in PICTURES:
-        raise ValueError(f"{output}: OUT must end with .exr or be a folder (--png adds a preview)")
+        raise ValueError(
+            f"{output}: OUT must end with .exr or .pfm or be a folder (--png adds a preview)"
+        )
     jobs = [Job(file, output if as_file else output / f"{file.stem}.exr") for file in files]
     check_apart((job.target for job in jobs), files)
     sources: dict[Path, Path] = {}

@@ -2,7 +2,8 @@
 
 A is what to judge: a file that `jflnr denoise` wrote (its layer `indirect`), or a frame (its noisy
 layer `indirect_N`, N from --spp). B is a frame with the layers `albedo` and `reference`; without B,
-A is measured against its own reference.
+A is measured against its own reference. --map reference=FILE gives B another reference: of another
+program's file a picture, of our own light.
 If neither file has a layer `reference`, their pictures are compared, B being the reference: the
 plain R, G, B, or what another program calls its picture (Blender's Combined).
 
@@ -12,12 +13,14 @@ brought to 0.35, clipped, gamma 2.2); rMSE, SMAPE and the squared errors on line
 """
 
 import argparse
+import functools
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from jflnr import layouts
-from jflnr.cli.common import metrics_table, to_json
+from jflnr.cli.common import add_map, metrics_table, to_json
 
 EXAMPLES = """\
   jflnr metrics clean/room.exr room.exr       against the frame's own reference
@@ -30,26 +33,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("a", metavar="A", type=Path, help="the image to judge, EXR")
     parser.add_argument("b", metavar="B", type=Path, nargs="?", help="its reference, EXR")
     parser.add_argument("--spp", type=int, default=1, metavar="N", help="noisy layer of a frame: 1")
+    add_map(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    measured = measure_files(arguments.a, arguments.b or arguments.a, arguments.spp)
+    a, b, layers = arguments.a, arguments.b or arguments.a, dict(arguments.map)
+    measured = measure_files(a, b, arguments.spp, layers)
     print(to_json(measured) if arguments.json else metrics_table({arguments.a.name: measured}))
     return 0
 
 
-def measure_files(a: Path, b: Path, spp: int) -> dict[str, float | None]:
+def measure_files(a: Path, b: Path, spp: int, layers: Mapping[str, str]) -> dict[str, float | None]:
     """The metrics of file `a` against file `b`, as this module's docstring says."""
     from jflnr import exr, metrics
     from jflnr.frame import read_frame
 
     exr.check_aligned(a, b)
     channels_a, channels_b = exr.read_channels(a), exr.read_channels(b)
-    if "reference" in exr.layers_of(channels_b):
-        return metrics.measure(read_frame(b, spp), _light(channels_a, spp, a))
-    picture = layouts.picture(channels_a, str(a))
-    return metrics.compare(picture, layouts.picture(channels_b, str(b)))
+    picture = functools.partial(layouts.picture, channels_a, str(a))
+    if "reference" in {*exr.layers_of(channels_b), *layers}:
+        frame = read_frame(b, spp, layers)
+        light = _light(channels_a, spp, a) if frame.beauty is None else picture()
+        return metrics.measure(frame, light)
+    return metrics.compare(picture(), layouts.picture(channels_b, str(b)))
 
 
 def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 IN are frames, files that `jflnr denoise` wrote from them, or plain R, G, B pictures. The page
 needs no network and no other file. It shows the real values at any exposure, splits, flips, zooms,
-and maps the errors where there is a reference: the frame's own, or for plain pictures --reference.
+and maps the errors where there is a reference: the frame's own or --map reference=FILE, or for
+pictures, also those of other programs' files, --reference.
 
 A version is named by its file, or by its folder where the file is named like the frame.
 """
@@ -10,8 +11,11 @@ A version is named by its file, or by its folder where the file is named like th
 import argparse
 from pathlib import Path
 
+from jflnr.cli.common import add_map, kept_as_it_is, printable
+
 EXAMPLES = """\
   jflnr report room.exr out/room.exr -o report.html     a frame and what was denoised from it
+  jflnr report render.exr out/render.exr --reference converged.exr -o report.html
   jflnr report a.exr b.exr --reference c.exr -o r.html  plain pictures
 """
 
@@ -21,13 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("inputs", metavar="IN", nargs="+", type=Path, help="EXR files, or folders of them")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="HTML file to write")
     add("--spp", type=int, default=1, metavar="N", help="noisy layer indirect_N of a frame (1)")
-    add("--reference", metavar="FILE", type=Path, help="what plain pictures are measured against")
+    add_map(parser)
+    add("--reference", metavar="FILE", type=Path, help="what pictures are measured against")
     add("--title", help="heading of the page (the scenes' names)")
     add("--overwrite", action="store_true", help="replace OUT if it exists")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr.cli.common import kept_as_it_is, printable
     from jflnr.cli.jobs import check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import collect
@@ -40,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     if output.exists() and not arguments.overwrite:
         print(kept_as_it_is(output))
         return 0
-    scenes = collect(paths, arguments.spp, arguments.reference)
+    scenes = collect(paths, arguments.spp, arguments.reference, dict(arguments.map))
     make_folder(output)
     title = arguments.title or ", ".join(scene.name for scene in scenes)
     write_report(output, scenes, title)

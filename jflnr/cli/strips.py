@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import jflnr
-from jflnr import exr, layouts
+from jflnr import exr, layouts, pfm
 from jflnr.cli.content import Pixels, about_of, channels_of, result_of, spp_of, warnings_of
 from jflnr.cli.jobs import Job
 from jflnr.frame import frame_of
@@ -27,6 +27,8 @@ def denoise_in_strips(
 ) -> dict[str, Any]:
     """Read, denoise and write a frame piece by piece; the record of it."""
     _check(arguments)
+    if pfm.named(job.source) or pfm.named(job.target):
+        raise ValueError("PFM needs the whole frame in memory: raise --memory")
     start = time.perf_counter()
     file = Scanlines(job.source, arguments.spp, dict(arguments.map))
     first = file.part(0, 1, (*layouts.LAYERS, *layouts.PICTURE))
@@ -69,8 +71,10 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "reference", "profile", "lobes"):
-        if getattr(arguments, option):
-            raise ValueError(f"--{option} needs the whole frame in memory: raise --memory")
+    for option in ("png", "reference", "fail_below", "profile", "lobes"):
+        if getattr(arguments, option) not in (None, False):
+            raise ValueError(
+                f"--{option.replace('_', '-')} needs the whole frame in memory: raise --memory"
+            )
     if arguments.channels == "all":
         raise ValueError("--channels all needs the whole frame in memory: raise --memory")

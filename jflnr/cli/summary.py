@@ -1,19 +1,35 @@
 """What `jflnr denoise` says of one frame, from the record of it that `--json` prints."""
 
+import re
 import sys
+from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 from jflnr.cli.common import kept_as_it_is, metrics_table, printable, profile_table, tinted
 
 
-def remarks(record: dict[str, Any], quiet: bool) -> list[str]:
-    """Lines for stderr."""
+def remarks(record: dict[str, Any], told: Counter[str]) -> Iterator[str]:
+    """Warnings of one frame that are new. told: how often each has come, whatever its numbers."""
+    for text in record.get("warnings", ()):
+        told[kind := re.sub(r"[\d.,]*\d", "N", text)] += 1
+        if told[kind] == 1:
+            yield _warning(record["input"], text)
+
+
+def repeated(told: Counter[str]) -> Iterator[str]:
+    """How many more frames each warning was of."""
+    yield from (_warning(f"{n - 1} more", kind) for kind, n in told.items() if n > 1)
+
+
+def _warning(what: str, text: str) -> str:
     warning = tinted("warning:", "yellow", sys.stderr)
-    found = [] if quiet else record.get("warnings", ())
-    lines = [f"jflnr: {warning} {printable(record['input'])}: {printable(text)}" for text in found]
-    if "error" in record:
-        lines.append(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}")
-    return lines
+    return f"jflnr: {warning} {printable(what)}: {printable(text)}"
+
+
+def failed(record: dict[str, Any]) -> str:
+    """Why a frame failed, for stderr."""
+    return f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}"
 
 
 def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: float) -> str:

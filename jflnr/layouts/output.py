@@ -1,10 +1,8 @@
 """The channels of a denoised file, in the terms of the file it came from."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from jflnr.layouts.channels import Layout
+from jflnr.layouts.channels import NATIVE, Layout
 from jflnr.layouts.override import BORROWED
 from jflnr.layouts.source import Source
 
@@ -14,13 +12,13 @@ CHOICES = ("picture", "light", "all")
 def output_channels(
     source: Source,
     picture: np.ndarray,
-    lights: Mapping[str, np.ndarray],
+    light: np.ndarray | None,
     mask: np.ndarray | None = None,
     alpha: np.ndarray | None = None,
     passes: np.ndarray | None = None,
     choice: str = "light",
 ) -> dict[str, np.ndarray]:
-    """What to write, from the picture (H, W, 3) and the denoised light (H, W, 3) by layer.
+    """What to write, from the picture (H, W, 3) and the denoised indirect light (H, W, 3) or None.
 
     alpha: (H, W, 1), that of the source if None. passes: (H, W, C), denoised, as `pass_names` names
     them. choice: `picture`, as `R`, `G`, `B` with its
@@ -34,13 +32,12 @@ def output_channels(
     if choice == "all":
         channels |= source.channels
         channels |= _planes(layout.picture[:3], picture)
-    if choice == "all" and layout.picture:
+    if choice == "all" and layout.picture and light is not None:
         surface = True if mask is None else mask[..., 0] > 0
-        for layer, light in lights.items():
-            for name, plane in _planes(layout.channels.get(layer, ()), light).items():
-                channels[name] = np.where(surface, plane, source.channels[name])
-    for layer, light in lights.items() if choice != "picture" else ():
-        channels |= _planes(tuple(f"{layer}.{c}" for c in "RGB"), light)
+        for name, plane in _planes(layout.channels.get("indirect", ()), light).items():
+            channels[name] = np.where(surface, plane, source.channels[name])
+    if choice != "picture" and light is not None:
+        channels |= _planes(NATIVE["indirect"], light)
     if passes is not None and choice != "picture":
         channels |= _planes(pass_names(layout), passes)
         channels.pop("", None)

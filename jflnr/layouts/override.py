@@ -10,7 +10,7 @@ import numpy as np
 from jflnr import checks, exr
 from jflnr.layouts.channels import LAYERS, PICTURE, Layout, in_layer, present
 
-FILE = re.compile(r"(?P<file>.+\.exr)(:(?P<name>.+))?", re.IGNORECASE | re.DOTALL)
+FILE = re.compile(r"(?P<file>.+\.(exr|pfm))(:(?P<name>.+))?", re.IGNORECASE | re.DOTALL)
 
 BORROWED = "file://"  # how the names of another file's channels start
 
@@ -20,8 +20,9 @@ def find(
 ) -> dict[str, tuple[str, ...]]:
     """The channels of the `layers` that the user maps; those of other files are added.
 
-    A value is a layer of the file, channels with commas between them, or `FILE.exr`, seen from the
-    folder of `path`, with `:` and one of those after it; `{stem}` in it is the stem of `path`.
+    A value is a layer of the file, channels with commas between them, or `FILE.exr` or `FILE.pfm`,
+    seen from the folder of `path`, with `:` and one of those after it; `{stem}` in it is the stem
+    of `path`.
     Raises ValueError if there is no such thing, and OSError as `read_channels` does.
     """
     found = {}

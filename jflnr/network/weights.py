@@ -62,7 +62,8 @@ def load(path: str | Path, read: Any = Read) -> tuple[unet.Params, dict[str, Any
 @functools.cache
 def shipped(method: str, read: Any = Read) -> unet.Params:
     """The weights that come with the package. read: as of `load`."""
-    return load(FOLDER / f"{method}.npz", read)[0]
+    with jax.ensure_compile_time_eval():  # they are kept, also if a function that is traced asks
+        return load(FOLDER / f"{method}.npz", read)[0]
 
 
 def _known(read: Any) -> dict[str, Any]:

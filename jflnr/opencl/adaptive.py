@@ -10,7 +10,8 @@ import numpy as np
 from jflnr.checks import one_sentence
 from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import (
-    check_counts,
+    check_guides,
+    in_passes,
     numbers_of,
     to_image,
     to_layers,
@@ -50,6 +51,7 @@ BRIGHT = 1e15
 
 
 @one_sentence
+@in_passes
 def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flr_adaptive` on an OpenCL device: same arguments, same result.
 
@@ -79,8 +81,7 @@ def run_on_images(
     context = default_context() if context is None else context
     method = dataclasses.replace(method, **options)
     check_regression(target, guides, None, weight)
-    check_counts(channel_count(guides), target.shape[2])
-    method = method.ready(channel_count(guides), target.shape[2])
+    method = method.ready(check_guides(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
     pixels, unit = in_unit(target)
     images = context.array(pixels), to_layers(context, guides), to_weight(context, weight)

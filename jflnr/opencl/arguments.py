@@ -1,24 +1,73 @@
 """Arguments of the regressions, from arrays of numpy or JAX to what the kernels can read."""
 
 import dataclasses
+import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from jflnr.opencl.context import Context, is_device_array
+from jflnr.opencl.context import Context, default_context, is_device_array
 from jflnr.opencl.moments import PARTS
-from jflnr.regression.arguments import layers_of
+from jflnr.regression.arguments import channel_count, layers_of
 
-MOST = {"guides": 16, "target": 9}
+# Channels that the kernels take at once.
+GUIDES, CHANNELS = 16, 9
 
 
-def check_counts(guides: int, channels: int) -> None:
-    """Raise `ValueError` if there are more channels than the kernels take."""
-    for name, count in (("guides", guides), ("target", channels)):
-        if count > MOST[name]:
-            raise ValueError(
-                f"{name} has {count} channels; the opencl backend takes at most {MOST[name]}"
-            )
+def check_guides(guides: Any) -> int:
+    """The number of channels of all guides; `ValueError` if it is more than the kernels take."""
+    count = channel_count(guides)
+    if count > GUIDES:
+        raise ValueError(f"guides has {count} channels; the opencl backend takes at most {GUIDES}")
+    return count
+
+
+def in_passes(regress: Callable[..., Any]) -> Callable[..., Any]:
+    """The regression, of light of any number of channels: in passes over some of them.
+
+    All channels are treated alike, by their brightness. So a pass takes, beside its own channels,
+    the sum of those that it leaves out: weights, windows and corrections then are those of all.
+    """
+
+    @functools.wraps(regress)
+    def run(
+        target: Any,
+        guides: Any,
+        *method: Any,
+        context: Context | None = None,
+        out: Any | None = None,
+        on_device: bool = False,
+        **options: Any,
+    ) -> Any:
+        count = target.shape[2] if len(getattr(target, "shape", ())) == 3 else 0
+        if count <= CHANNELS:
+            options |= {"context": context, "out": out, "on_device": on_device}
+            return regress(target, guides, *method, **options)
+        context = default_context() if context is None else context
+        light = target.get() if is_device_array(target) else np.asarray(target)
+        size = (layers_of(options.get("guides_map")) or [target])[0].shape[:2]
+        _, result = to_output(context, (*size, count), out, on_device)
+        image = np.empty(result.shape, result.dtype)
+        # Brightness is that of colours where channels come in threes: 6 and 3, or 7 and 1.
+        colours = 3 if count % 3 == 0 else 1
+        own = CHANNELS - 3 if colours == 3 else CHANNELS - 2
+        error: list[Any] = []
+        for start in range(0, count, own):
+            mine = slice(min(start, count - own), min(start + own, count))
+            others = np.delete(light, mine, axis=2).reshape(*light.shape[:2], -1, colours)
+            both = np.concatenate([light[..., mine], others.sum(2, dtype=np.float32)], axis=2)
+            given = regress(both, guides, *method, context=context, **options)
+            part, *error = given if isinstance(given, tuple) else (given,)
+            image[..., mine] = part[..., :own]
+        if is_device_array(result):
+            result.set(image)
+            error = [context.array(plane) for plane in error]
+        else:
+            result[...] = image
+        return (result, *error) if error else result
+
+    return run
 
 
 def numbers_of(method: Any) -> Any:

@@ -16,11 +16,17 @@ from jflnr.opencl import devices, kept
 
 
 class Launch(NamedTuple):
-    """One execution of a kernel: its event, and the bytes it must at least read and write."""
+    """One execution of a kernel: its event, the bytes it must at least read and write, and how it
+    was launched; `size`: work-items that are needed, `group`: in x of a work-group."""
 
     kernel: str
     event: Any
     bytes: int
+    file: str
+    defines: dict[str, int]
+    size: tuple[int, ...]
+    group: int
+    arguments: tuple[Any, ...]
 
 
 class Context:
@@ -28,7 +34,7 @@ class Context:
 
     Threads may share one: their kernels run one after another. A forked process may not.
 
-    device: a `pyopencl.Device`, its number or a part of its name (see `jflnr devices`), or None
+    device: a `pyopencl.Device`, its number or a part of its name (see `jflnr doctor`), or None
     for the best one. work_group: number of work-items in x of a work-group; results do not depend
     on it. Raises `NoDevice` or `ValueError`.
     """
@@ -102,7 +108,8 @@ class Context:
         if (launches := self._launches.get(threading.get_ident())) is not None:
             arrays = {id(a): a.nbytes for a in arguments if hasattr(a, "nbytes")}
             moved = sum(arrays.values()) if moved is None else moved
-            launches.append(Launch(name, event, moved))
+            told = file, defines, tuple(size), group, tuple(arguments)
+            launches.append(Launch(name, event, moved, *told))
 
     @contextlib.contextmanager
     def recorded(self) -> Iterator[list[Launch]]:

@@ -8,12 +8,14 @@ from jflnr.network.flnr import DEFAULT, FLNR
 from jflnr.network.picture import PictureFLNR
 from jflnr.opencl import network
 from jflnr.opencl.adaptive import flr_adaptive, run_on_images, write_light
+from jflnr.opencl.arguments import in_passes
 from jflnr.opencl.context import Context
 from jflnr.opencl.energy import rescale
 from jflnr.opencl.grids import Images
 
 
 @one_sentence
+@in_passes
 def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flnr` on an OpenCL device; all else as of `jflnr.opencl.flr_adaptive`."""
     return run_on_images(write, target, guides, method, **options)

@@ -5,16 +5,24 @@ from typing import Any
 
 from jflnr.checks import one_sentence
 from jflnr.opencl.apply import apply
-from jflnr.opencl.arguments import check_counts, to_image, to_layers, to_output, to_weight
+from jflnr.opencl.arguments import (
+    check_guides,
+    in_passes,
+    to_image,
+    to_layers,
+    to_output,
+    to_weight,
+)
 from jflnr.opencl.blur import blur
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import centre, collect
 from jflnr.opencl.solve import solve
-from jflnr.regression.arguments import channel_count, check_regression, layers_of
+from jflnr.regression.arguments import check_regression, layers_of
 from jflnr.regression.flr import DEFAULT, FLR
 
 
 @one_sentence
+@in_passes
 def flr(
     target: Any,
     guides: Any,
@@ -45,8 +53,7 @@ def flr(
     shape = (*(layers_of(guides_map) or [target])[0].shape[:2], target.shape[2])
     method = method.at(factor, max(shape[:2]))
     y, channels = context.array(to_image(target)), target.shape[2]
-    x, count = to_layers(context, guides), channel_count(guides)
-    check_counts(count, channels)
+    x, count = to_layers(context, guides), check_guides(guides)
     x_map = x if guides_map is None else to_layers(context, guides_map)
     output, result = to_output(context, shape, out, on_device)
 

@@ -14,17 +14,21 @@ from jflnr.files import replacing
 MOST = 1 << 27
 
 
-def place_of(device: Any, text: str, options: list[str]) -> Path | None:
-    """Where the program of this source and these options is kept for the device, if anywhere.
-
-    Beside what PoCL keeps where its variables say so, or nowhere if they say that it keeps nothing.
-    """
+def folder() -> Path | None:
+    """Where programs are kept: beside what PoCL keeps where its variables say so, or nowhere if
+    they say that it keeps nothing."""
     if os.environ.get("POCL_KERNEL_CACHE") == "0":
         return None
-    folder = os.environ.get("POCL_CACHE_DIR") or platformdirs.user_cache_dir("jflnr")
+    return Path(os.environ.get("POCL_CACHE_DIR") or platformdirs.user_cache_dir("jflnr"), "opencl")
+
+
+def place_of(device: Any, text: str, options: list[str]) -> Path | None:
+    """Where the program of this source and these options is kept for the device, if anywhere."""
+    if (home := folder()) is None:
+        return None
     driver = device.platform.version, device.name, device.driver_version, device.version
     key = hashlib.sha256("\0".join([*driver, *options, text]).encode()).hexdigest()
-    return Path(folder, "opencl", key[:32])
+    return home / key[:32]
 
 
 def read(place: Path) -> bytes | None:

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jflnr import checks
 from jflnr.checks import one_sentence
 from jflnr.frame import Frame
 from jflnr.opencl import twins
@@ -21,8 +22,9 @@ from jflnr.temporal.sequence import PAST, State, Temporal, prepared
 
 
 def start(frame: Frame, context: Context | None = None) -> State:
-    """`jflnr.temporal.start`, on the device."""
+    """`jflnr.temporal.start`, on the device, of one light group."""
     context = default_context() if context is None else context
+    checks.image("indirect", frame.indirect, 3)
     height, width = frame.normal.shape[:2]
     zeros = lambda channels: context.array(np.zeros((height, width, channels), np.float32))
     surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))

@@ -90,7 +90,6 @@ def _image(scene: Scene, name: str, unit: float) -> dict[str, Any]:
     return {
         "name": name,
         "light": pack(scene.images[name], unit),
-        "direct": pack(scene.direct[name], unit) if name in scene.direct else None,
         "flip": None if errors is None else _deflated(np.uint8(np.round(255 * errors)).tobytes()),
         "metrics": scene.measure(name) if measured else None,
     }

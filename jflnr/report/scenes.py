@@ -1,7 +1,7 @@
 """What a page compares: one frame, or pictures without one, in several versions."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,11 @@ class Scene:
 
     With a `frame` they are demodulated indirect light, without one radiance. The version called
     `reference`, if there is one, is what the others are measured against, and comes last.
-    `direct` is the direct light of versions that have one of their own instead of the frame's.
     """
 
     name: str
     images: dict[str, np.ndarray]
     frame: Frame | None = None
-    direct: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         checks.same_size(**self.images, frame=self.frame and self.frame.albedo)
@@ -48,46 +46,52 @@ class Scene:
         return metrics.measure(self.frame, self.images[name])
 
 
-def of_frame(
-    name: str,
-    frame: Frame,
-    lights: dict[str, np.ndarray],
-    direct: dict[str, np.ndarray] | None = None,
-) -> Scene:
+def of_frame(name: str, frame: Frame, lights: dict[str, np.ndarray]) -> Scene:
     """The frame's noisy light, the denoised `lights`, and its reference if it has one."""
     images = {NOISY: np.asarray(frame.indirect), **lights}
     if frame.reference is not None:
         images[REFERENCE] = np.asarray(frame.reference)
-    return Scene(name, images, frame, direct or {})
+    return Scene(name, images, frame)
 
 
-def collect(paths: Sequence[Path], spp: int, reference: Path | None) -> list[Scene]:
+def collect(
+    paths: Sequence[Path],
+    spp: int,
+    reference: Path | None,
+    layers: Mapping[str, str] | None = None,
+) -> list[Scene]:
     """Read files of any kind and put together what belongs together.
 
-    A frame starts a scene, with its noisy light `indirect_{spp}` and its reference. What
-    `jflnr denoise` wrote joins the one frame there is or, of several, the one whose name it has.
-    Without frames, plain R, G, B are compared, against those of the file `reference`.
+    A frame starts a scene, with its noisy light `indirect_{spp}` and its reference, or, of another
+    program, with its picture. What `jflnr denoise` wrote joins the one frame there is or, of
+    several, the one whose name it has. Without frames, plain R, G, B are compared. Pictures are
+    measured against that of the file `reference`. layers: of frames, as of `read_frame`.
     Raises OSError and ValueError, in one sentence, for what cannot be compared.
     """
     channels = {path: exr.read_channels(path) for path in paths}
     frames = [path for path in paths if not _is_picture(channels[path])]
     pictures = [path for path in paths if path not in frames]
     if not frames:
-        return [_plain(pictures, channels, reference)]
-    if reference is not None:
-        raise ValueError(f"--reference is for plain pictures, and {frames[0]} is a frame")
+        name = paths[0].stem if len(paths) == 1 else "pictures"
+        return [Scene(name, _plain(_names(pictures), channels, reference))]
     owners = {path: _owner(path, frames) for path in pictures}
     scenes = []
     for source in frames:
         names = _names([path for path in pictures if owners[path] == source], source.stem)
         exr.check_aligned(source, *names)
-        lights = {name: _light(channels[path], path, "indirect") for path, name in names.items()}
-        direct = {
-            name: _light(channels[path], path, "direct")
-            for path, name in names.items()
-            if "direct.R" in channels[path]
-        }
-        scenes.append(of_frame(source.stem, read_frame(source, spp), lights, direct))
+        frame = read_frame(source, spp, layers)
+        if frame.beauty is not None:
+            images = _plain({source: NOISY} | names, channels, reference)
+            if frame.reference is not None:
+                images.setdefault(REFERENCE, np.asarray(frame.reference))
+            scenes.append(Scene(source.stem, images))
+            continue
+        if reference is not None:
+            raise ValueError(
+                f"--reference is for pictures, and {source} is a frame: --map reference=FILE"
+            )
+        lights = {name: _light(channels[path], path) for path, name in names.items()}
+        scenes.append(of_frame(source.stem, frame, lights))
     return scenes
 
 
@@ -96,13 +100,15 @@ def _is_picture(channels: dict[str, np.ndarray]) -> bool:
     return "indirect.R" in channels or set(channels) <= set("RGBA")
 
 
-def _plain(paths: Sequence[Path], channels: dict, reference: Path | None) -> Scene:
-    names = _names(paths)
-    exr.check_aligned(*paths, *([] if reference is None else [reference]))
+def _plain(
+    names: Mapping[Path, str], channels: Mapping[Path, dict], reference: Path | None
+) -> dict[str, np.ndarray]:
+    """The pictures of files by their names, and that of the file `reference`."""
+    exr.check_aligned(*names, *([] if reference is None else [reference]))
     images = {name: layouts.picture(channels[p], str(p)) for p, name in names.items()}
     if reference is not None:
         images[REFERENCE] = layouts.picture(exr.read_channels(reference), str(reference))
-    return Scene(paths[0].stem if len(paths) == 1 else "pictures", images)
+    return images
 
 
 def _owner(path: Path, frames: Sequence[Path]) -> Path:
@@ -129,10 +135,10 @@ def _names(paths: Sequence[Path], frame: str | None = None) -> dict[Path, str]:
     return {path: str(path) for path in paths}
 
 
-def _light(channels: dict[str, np.ndarray], path: Path, layer: str) -> np.ndarray:
+def _light(channels: dict[str, np.ndarray], path: Path) -> np.ndarray:
     if "indirect.R" not in channels:
         raise ValueError(
             f"{path} holds no layer indirect, so that it cannot be compared with a frame; "
             "leave the frame out to compare plain pictures"
         )
-    return layouts.layer(channels, layer, tuple(f"{layer}.{c}" for c in "RGB"), str(path))
+    return layouts.layer(channels, "indirect", tuple(f"indirect.{c}" for c in "RGB"), str(path))

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import termios
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -128,7 +129,7 @@ def test_only_the_picture(tmp_path: Path, frame_file: Path) -> None:
 def test_quiet_prints_errors_only(
     tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(folder, "-o", tmp_path / "out", "--quiet") == 2
+    assert run(folder, "-o", tmp_path / "out", "--quiet") == 3
     streams = capsys.readouterr()
     assert streams.out == ""
     assert streams.err.count("\n") == 1 and "b.exr is truncated" in streams.err
@@ -233,7 +234,7 @@ def test_a_frame_is_done_when_all_that_was_asked_for_is_there(
 def test_one_failing_frame_does_not_stop_the_others(
     tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(folder, "-o", tmp_path / "out") == 2
+    assert run(folder, "-o", tmp_path / "out") == 3
     streams = capsys.readouterr()
     assert files(tmp_path / "out") == ["a.exr", "c.exr"]
     assert (
@@ -249,7 +250,7 @@ def test_one_failing_frame_does_not_stop_the_others(
 def test_json_holds_every_frame(
     tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(folder, "-o", tmp_path / "out", "--json") == 2
+    assert run(folder, "-o", tmp_path / "out", "--json") == 3
     records = json.loads(capsys.readouterr().out)
     assert [record["status"] for record in records] == ["written", "failed", "written"]
     assert "truncated" in records[1]["error"]
@@ -276,11 +277,51 @@ def test_pixels_that_are_not_finite_are_reported(
     assert "warning" in (error := capsys.readouterr().err) and "6 of indirect" in error
 
 
+@pytest.mark.usefixtures("stand_in")
+def test_frames_of_too_little_psnr_fail(
+    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Against the reference of each, which is here that of another file."""
+    (folder / "b.exr").unlink()
+    frame = read_frame(folder / "a.exr")
+    exact = dataclasses.replace(frame, reference=0.5 * frame.indirect)
+    write_frame(tmp_path / "c_reference.exr", exact)
+    write_frame(tmp_path / "a_reference.exr", frame)
+    reference = "reference=../{stem}_reference.exr:reference"
+    command = folder, "-o", tmp_path / "out", "--map", reference, "--fail-below", 60
+    assert run(*command, "--json", "--log", tmp_path / "log.txt") == 3
+    poor, good = json.loads(capsys.readouterr().out)
+    assert "its PSNR of" in poor["error"]
+    assert good["metrics"]["denoised"]["psnr"] is None  # infinite
+    assert files(tmp_path / "out") == ["c.exr"]
+    assert run(*command, "--log", tmp_path / "log.txt") == 3
+    log = (tmp_path / "log.txt").read_text()
+    lines = [line for line in log.splitlines() if line.startswith("20")]
+    assert all(datetime.fromisoformat(line[:19]) for line in lines)
+    assert ["its PSNR of" in line for line in lines] == [True, False, True, False]
+    assert " -> " in lines[1] and "c.exr kept as it is" in lines[3]
+    assert run(folder / "a.exr", *command[1:], "--quiet") == 2
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_what_many_frames_have_is_said_once(
+    tmp_path: Path, frame: Frame, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "in").mkdir()
+    for i in range(1, 4):
+        indirect = frame.indirect.copy()
+        indirect[0, :i] = np.nan
+        write_frame(tmp_path / "in" / f"{i}.exr", dataclasses.replace(frame, indirect=indirect))
+    assert run(tmp_path / "in", "-o", tmp_path / "out") == 0
+    first, others = capsys.readouterr().err.splitlines()
+    assert "1.exr: pixels that are NaN" in first and "warning: 2 more: pixels that" in others
+
+
 ERRORS = [
     (("gone.exr", "-o", "out.exr"), "there is no such file"),
     (("frames", "-o", "out.exr"), "OUT must be a folder when there are several frames"),
     (("empty", "-o", "out"), "there is no EXR file in this folder"),
-    (("frame.exr", "-o", "out.png"), "OUT must end with .exr or be a folder"),
+    (("frame.exr", "-o", "out.png"), "OUT must end with .exr or .pfm or be a folder"),
     (("frame.exr", "-o", "frame.exr"), "would replace an input"),
     (("frame.exr", "frames/a.exr", "frames/../frames/a.exr", "-o", "o"), "would both be written"),
     (("frame.exr", "-o", "notes.txt/out.exr"), "notes.txt/out.exr cannot be written"),

@@ -8,6 +8,7 @@ import pytest
 
 from jflnr import exr
 from jflnr.cli import main
+from jflnr.methods import BACKENDS
 
 
 def info(path: Path, capsys: pytest.CaptureFixture[str]) -> dict:
@@ -30,6 +31,7 @@ def test_a_frame(frame_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert layers["albedo"]["channels"] == "R G B"
     assert layers["depth"]["type"] == "float"
     assert facts["denoiser"]["spp"] == [1]
+    assert facts["denoiser"]["backend"] in BACKENDS
     assert facts["denoiser"]["guides"] == ["normal", "depth", "ao"]
     assert facts["denoiser"]["reference"] is True
 

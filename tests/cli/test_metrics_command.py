@@ -1,14 +1,16 @@
 """`jflnr metrics A [B]`: which files may stand on either side."""
 
+import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from jflnr import exr, metrics
+from jflnr import exr, layouts, metrics
 from jflnr.cli import main
 from jflnr.frame import Frame
+from tests.layouts.blender_passes import passes
 
 
 def measured(capsys: pytest.CaptureFixture[str], *argv: object) -> dict:
@@ -41,6 +43,22 @@ def test_plain_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     values = measured(capsys, a, b)
     assert values["smape"] == pytest.approx(1 / 3, rel=1e-6)
     assert "mse_unbiased" not in values
+
+
+def test_a_reference_from_elsewhere(
+    tmp_path: Path, frame: Frame, frame_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a frame light, of another program's picture another picture."""
+    other = write(tmp_path / "other.exr", "", np.asarray(frame.indirect) * np.float32(1.1))
+    values = measured(capsys, frame_file, "--map", f"reference={other}")
+    elsewhere = dataclasses.replace(frame, reference=1.1 * frame.indirect, reference_a=None)
+    right = metrics.measure(elsewhere, frame.indirect) | {"mse_unbiased": values["mse_unbiased"]}
+    assert values == pytest.approx(right, rel=1e-4)
+    whole = tmp_path / "whole.exr"
+    exr.write_channels(whole, passes(frame))
+    picture, clean = layouts.picture(passes(frame), ""), exr.read_channels(other)
+    right = metrics.compare(picture, np.stack([clean[c] for c in "RGB"], -1))
+    assert measured(capsys, whole, "--map", f"reference={other}") == pytest.approx(right, rel=1e-4)
 
 
 def test_an_infinite_psnr_is_null_in_json(

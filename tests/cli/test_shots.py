@@ -171,7 +171,7 @@ def test_a_frame_that_failed_is_made_good_later(
     out, state = tmp_path / "out", tmp_path / "state.npz"
     whole = (shot / NAMES[1]).read_bytes()
     (shot / NAMES[1]).write_bytes(whole[:2000])
-    assert run(shot, "-o", out, "--history", state) == 2
+    assert run(shot, "-o", out, "--history", state) == 3
     assert NAMES[1] in capsys.readouterr().err
     assert sorted(p.name for p in out.iterdir()) == sorted({*NAMES} - {NAMES[1]})
     (shot / NAMES[1]).write_bytes(whole)

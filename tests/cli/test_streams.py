@@ -12,11 +12,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 
+import jflnr
 from jflnr import exr
 from jflnr.cli import main
 from jflnr.files import replacing
+from jflnr.frame import composite
 
 JFLNR = f"{sys.executable} -m jflnr"
 INFO, DENOISE = "info frame.exr", "denoise frame.exr -o out.exr"
@@ -57,6 +60,49 @@ def test_names_that_the_terminal_has_no_letters_for(frame_file: Path, name: byte
     done = shell(line, folder, PYTHONIOENCODING="cp1252", PYTHONUTF8="0")
     assert done.returncode == 0, done.stderr
     assert len(list((folder / "out").iterdir())) == 4
+
+
+def test_what_scripts_for_open_image_denoise_give(tmp_path: Path, frame: jflnr.Frame) -> None:
+    """Three PFM files are the picture that an EXR with these layers is, and any stream of it."""
+    images = {"color": composite(frame, frame.indirect), "albedo": frame.albedo}
+    channels = {}
+    for name, image in (images | {"normal": frame.normal}).items():
+        planes = np.moveaxis(np.asarray(image, np.float32), -1, 0)
+        exr.write_channels(tmp_path / f"{name}.pfm", dict(zip("RGB", planes, strict=True)))
+        channels |= {f"{name}.{c}": plane for c, plane in zip("RGB", planes, strict=True)}
+    exr.write_channels(tmp_path / "all.exr", channels)
+    trio = f"{JFLNR} denoise --hdr color.pfm --alb albedo.pfm --nrm normal.pfm"
+    for line in (
+        f"{trio} -o out.pfm",
+        f"{trio} -o out.pfm",  # which is kept
+        f"{trio} -o - > piped.pfm",
+        f"{JFLNR} denoise all.exr -o out.exr",
+        f"cat all.exr | {JFLNR} denoise - -o - > piped.exr",
+    ):
+        done = shell(line, tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "piped.pfm").read_bytes() == (tmp_path / "out.pfm").read_bytes()
+    found = [exr.read_channels(tmp_path / f"{name}") for name in ("out.pfm", "piped.exr")]
+    for name, pixels in exr.read_channels(tmp_path / "out.exr").items():
+        for one in found:
+            np.testing.assert_array_equal(one[name], pixels)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("--hdr a.pfm -o b.pfm", "--hdr, --alb and --nrm are given together"),
+        ("--hdr a.pfm --alb a.pfm --nrm b.pfm -o b.pfm", "would replace an input"),
+        ("- a.exr -o b", "- stands for one frame"),
+        ("-o b", "IN is missing"),
+        ("a.exr -o - --png", "writes one picture to standard output"),
+    ],
+)
+def test_streams_and_pictures_that_do_not_go_together(
+    line: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["denoise", *line.split()]) == 2
+    assert message in capsys.readouterr().err
 
 
 # Not UTF-8, what a terminal obeys, what HTML and JSON quote, what a line ends with.

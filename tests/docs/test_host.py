@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from docs.launches import launches, parameters, tables
+from jflnr.opencl import NoDevice
 from jflnr.regression.flr import DEFAULT, flr
 
 ROOT = Path(__file__).parents[2]
@@ -48,6 +50,27 @@ def test_c_host_computes_what_jax_does(host: list[str], tmp_path: Path) -> None:
     found = np.fromfile(files[2], np.float32).reshape(light.shape)
     expected = np.asarray(flr(light, guides, DEFAULT))
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
+def test_the_page_has_what_is_launched(method: str) -> None:
+    try:
+        printed = tables(launches(method, 640, 360))
+    except NoDevice as error:
+        pytest.skip(str(error))
+    assert printed in (ROOT / "docs" / "opencl_engine.md").read_text()
+
+
+def test_every_parameter_has_a_name_and_an_argument() -> None:
+    """Also those that macros stand for, one in another."""
+    try:
+        found = launches("flnr-small", 32, 32)
+    except NoDevice as error:
+        pytest.skip(str(error))
+    for launch in found:
+        assert len(parameters(launch)) >= len(launch.arguments), launch.kernel
+    (said,) = [launch for launch in found if launch.file == "network/features.cl"]
+    assert dict(zip(parameters(said), said.arguments, strict=True))["error"].shape == (32, 32, 1)
 
 
 def test_c_host_says_what_is_wrong(host: list[str], tmp_path: Path) -> None:

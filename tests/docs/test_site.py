@@ -1,5 +1,6 @@
 """The site builds without a warning, and its code blocks run as they stand."""
 
+import os
 import shlex
 import shutil
 import subprocess
@@ -56,7 +57,11 @@ def folder(tmp_path: Path, frame: Frame, monkeypatch: pytest.MonkeyPatch) -> Pat
 
 
 def run_shell(example: Example) -> None:
-    """Each line of a shell block; `jflnr` in this process, which is quick."""
+    """A script as it is, else each line of a block; `jflnr` in this process, which is quick."""
+    if example.parsed.startswith("#!"):
+        script = f'jflnr() {{ {sys.executable} -m jflnr "$@"; }}\n{example.parsed}'
+        subprocess.run(["bash", "-c", script], check=True, env=os.environ | {"PYTHONPATH": ROOT})
+        return
     for line in example.parsed.splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] == ["jflnr"]:

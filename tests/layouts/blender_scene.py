@@ -1,17 +1,21 @@
 """Run by Blender's Python: render a small scene as multilayer EXR.
 
-    python blender_scene.py OUT WIDTH HEIGHT SAMPLES PASSES [SCRIPT]
+    python blender_scene.py OUT WIDTH HEIGHT SAMPLES PASSES [ZIP COMMAND]
 
 PASSES is `all`, `denoising` (only what `Denoising Data` gives), `denoised` (both, with Blender's
 own denoiser on) or `moving` (all, and the cube has come from 0.4 to the left and 0.1 below).
-With SCRIPT, that example is run on the scene instead, and its picture saved.
+With ZIP, that extension is installed instead, with its COMMAND, and run on the scene: the folder
+OUT then holds what it rendered, `noisy.exr`, what it showed of that, `shown.npy`, and two frames of
+an animation, `frames/`.
 """
 
-import runpy
+import shutil
 import sys
 from math import pi
+from pathlib import Path
 
 import bpy
+import numpy as np
 
 LIGHT = [
     f"{kind}_{part}"
@@ -80,16 +84,40 @@ def move(scene, cube):
     scene.frame_set(2)
 
 
-def main(path, width, height, samples, passes, script=""):
+def extend(scene, out, zip, command):
+    install = bpy.ops.extensions.package_install_files
+    install(filepath=zip, repo="user_default", enable_on_install=True)
+    bpy.context.preferences.addons["bl_ext.user_default.jflnr"].preferences.command = command
+    assert bpy.types.RENDER_PT_jflnr.poll(bpy.context)
+    image = scene.render.image_settings
+    before = scene.render.filepath, image.file_format, scene.view_layers[0].use_pass_position
+    assert bpy.ops.render.jflnr() == {"FINISHED"}
+    assert before == (
+        scene.render.filepath, image.file_format, scene.view_layers[0].use_pass_position
+    )  # fmt: skip
+    shutil.copy(Path(bpy.app.tempdir, "jflnr-noisy.exr"), out / "noisy.exr")
+    shown = bpy.data.images["jflnr"]
+    width, height = shown.size
+    np.save(out / "shown.npy", np.reshape(shown.pixels, (height, width, -1))[::-1, :, :3])
+
+    move(scene, bpy.data.objects["Cube"])
+    scene.render.filepath, scene.frame_end = f"{out}/frames/f_", 2
+    bpy.ops.render.jflnr_passes()
+    bpy.ops.render.render(animation=True)
+    assert bpy.ops.render.jflnr_animation() == {"FINISHED"}
+    assert bpy.data.images["jflnr"].source == "SEQUENCE"
+    bpy.context.preferences.addons["bl_ext.user_default.jflnr"].preferences.command = "nowhere"
+    try:
+        bpy.ops.render.jflnr()
+    except RuntimeError as error:
+        assert "jflnr is not found" in str(error)
+
+
+def main(path, width, height, samples, passes, *extension):
     scene = build(int(width), int(height), int(samples))
-    if not script:
+    if not extension:
         return write(scene, path, passes)
-    before = scene.render.filepath, scene.render.image_settings.file_format
-    picture = runpy.run_path(script)["main"]()
-    assert (scene.render.filepath, scene.render.image_settings.file_format) == before
-    assert tuple(picture.size) == (int(width), int(height))
-    picture.file_format = "OPEN_EXR"
-    picture.save(filepath=path)
+    return extend(scene, Path(path), *extension)
 
 
 if __name__ == "__main__":

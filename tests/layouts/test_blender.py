@@ -196,7 +196,8 @@ def blender(request: pytest.FixtureRequest) -> Path:
 
 
 SCENE = Path(__file__).with_name("blender_scene.py")
-EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "blender_denoise.py"
+ROOT = Path(__file__).parents[2]
+EXTENSION = ROOT / "docs" / "examples" / "blender"
 
 
 def noise(picture: np.ndarray) -> float:
@@ -205,8 +206,7 @@ def noise(picture: np.ndarray) -> float:
 
 
 def render(python: Path, *arguments: object) -> None:
-    jflnr = Path(sys.executable).with_name("jflnr")
-    environment = os.environ | {"JFLNR": str(jflnr), "PYTHONPATH": ""}
+    environment = os.environ | {"PYTHONPATH": ""}
     command = [str(a) for a in (python, SCENE, *arguments)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -254,10 +254,26 @@ def test_motion_leads_to_where_a_point_was(blender: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_the_example_script(blender: Path, tmp_path: Path) -> None:
-    render(blender, tmp_path / "noisy.exr", 96, 64, 1, "all")
-    render(blender, tmp_path / "clean.exr", 96, 64, 1, "all", EXAMPLE)
-    clean = np.stack([exr.read_channels(tmp_path / "clean.exr")[c] for c in "RGB"], -1)
-    noisy = beauty(tmp_path / "noisy.exr")
-    assert clean.shape == noisy.shape
-    assert noise(clean) < 0.25 * noise(noisy)
+def test_the_extension(blender: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Installed from its zip, it gives what the command does, of a frame and of an animation."""
+    archive, command = tmp_path / "jflnr_blender.zip", tmp_path / "command"
+    files = [EXTENSION / name for name in ("blender_manifest.toml", "__init__.py")]
+    subprocess.run([sys.executable, "-m", "zipfile", "-c", archive, *files], check=True)
+    command.write_text(f'#!/bin/sh\nPYTHONPATH={ROOT} exec {sys.executable} -m jflnr "$@"\n')
+    command.chmod(0o755)
+    monkeypatch.setenv("BLENDER_USER_RESOURCES", str(tmp_path / "blender"))
+    render(blender, tmp_path, 96, 64, 1, "all", archive, command)
+
+    def pixels(path: Path) -> np.ndarray:
+        return np.stack([exr.read_channels(path)[c] for c in "RGB"], -1)
+
+    options = ["--method", "picture", "--quiet"]
+    assert main(["denoise", f"{tmp_path}/noisy.exr", "-o", f"{tmp_path}/clean.exr", *options]) == 0
+    np.testing.assert_array_equal(np.load(tmp_path / "shown.npy"), pixels(tmp_path / "clean.exr"))
+    assert noise(pixels(tmp_path / "clean.exr")) < 0.25 * noise(beauty(tmp_path / "noisy.exr"))
+    frames, out = tmp_path / "frames", tmp_path / "out"
+    assert main(["denoise", str(frames), "-o", str(out), "--temporal", *options]) == 0
+    found = sorted((frames / "jflnr").iterdir())
+    assert [path.name for path in found] == ["f_0001.exr", "f_0002.exr"]
+    for path in found:
+        np.testing.assert_array_equal(pixels(path), pixels(out / path.name))

@@ -197,7 +197,7 @@ def test_any_names_give_a_frame_or_one_sentence(
         return
     frame = Frame(**images)  # type: ignore[arg-type]
     picture = composite(frame, frame.indirect)
-    written = layouts.output_channels(source, picture, {}, frame.mask, choice="all")
+    written = layouts.output_channels(source, picture, None, frame.mask, choice="all")
     beauty = source.layout.channels.get("beauty", ())
     for name in beauty:
         np.testing.assert_allclose(written[name], channels[name], rtol=1e-4, atol=1e-5)

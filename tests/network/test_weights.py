@@ -116,3 +116,10 @@ def test_a_file_that_unpacks_to_too_much_is_not_read(tmp_path):
 def test_no_file(tmp_path):
     with pytest.raises(ValueError, match="no such file"):
         weights.load(tmp_path / "none.npz")
+
+
+def test_what_ships_may_first_be_asked_for_inside_jit():
+    """It is kept for later calls, in which no tracer is of use."""
+    weights.shipped.cache_clear()
+    jax.jit(lambda x: (x, weights.shipped("flnr-small"))[0])(1.0)
+    assert all(np.asarray(array).size for array in weights.shipped("flnr-small").values())

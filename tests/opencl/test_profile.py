@@ -1,5 +1,6 @@
 """What is reported about devices and times."""
 
+import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ import jflnr
 from jflnr.cli import main
 from jflnr.images.guides import DEFAULT, layers
 from jflnr.images.noisy_guides import smooth_guide
-from jflnr.opencl import Context, flr, flr_adaptive
+from jflnr.opencl import Context, flr, flr_adaptive, kept
 from jflnr.opencl.profile import profile
 from jflnr.regression.adaptive import AdaptiveFLR
 from tests.opencl import tolerances
@@ -36,20 +37,26 @@ def test_every_kernel_has_a_row(context: Context) -> None:
     assert rows["moments"].bytes == target.nbytes + guides.nbytes + moments + 5 * 4
 
 
-def test_devices_command(context: Context, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["devices"]) == 0
-    assert context.device.name.strip() in capsys.readouterr().out
-    assert main(["devices", "--json"]) == 0
-    backends = [row["backend"] for row in json.loads(capsys.readouterr().out)]
-    assert "jax" in backends and "opencl 0" in backends
+def test_doctor(context: Context, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    assert context.device.name.strip() in text and str(kept.folder()) in text
+    assert main(["doctor", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert [row["one frame by"] for row in facts["frame"]] == ["jax", "opencl"]
+    kept_bytes = {row["folder"]: row["bytes"] for row in facts["caches"]}[str(kept.folder())]
+    assert kept_bytes == sum(path.stat().st_size for path in kept.folder().iterdir())
 
 
-def test_devices_command_without_opencl(
+def test_doctor_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyopencl", None)
-    assert main(["devices"]) == 0
-    assert "pip install 'jflnr[opencl]'" in capsys.readouterr().out
+    monkeypatch.setattr(importlib.util, "find_spec", lambda module: None)
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    for package in ("jflnr[opencl]", "jflnr[large]", "jflnr[cluster]", "flip-evaluator"):
+        assert f"pip install '{package}'" in text
 
 
 def test_denoise_backend(

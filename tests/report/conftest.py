@@ -30,13 +30,12 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def scene(frame: Frame) -> Scene:
-    """The made-up frame in two versions: half as bright, with a direct light of its own, and exact
-    but for one pixel."""
+    """The made-up frame in two versions: half as bright, and exact but for one pixel."""
     assert frame.reference is not None
     nearly = np.array(frame.reference)
     nearly[5, 7] = (0.25, np.nan, np.inf)
     half = 0.5 * np.asarray(frame.reference)
-    return of_frame("made up", frame, {"half": half, "nearly": nearly}, direct={"half": 2 * half})
+    return of_frame("made up", frame, {"half": half, "nearly": nearly})
 
 
 @pytest.fixture

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jflnr import exr
+from jflnr import exr, layouts
 from jflnr.cli import main
 from jflnr.frame import Frame, write_frame
 from jflnr.report.crops import find_crops
 from jflnr.report.scenes import Scene, collect
+from tests.layouts.blender_passes import passes
 
 
 def write_output(path: Path, image: np.ndarray, layer: str = "indirect.") -> Path:
@@ -59,11 +60,27 @@ def test_plain_pictures_need_a_reference_to_be_measured(tmp_path: Path, frame: F
     assert scene.measure("a")["mse"] == pytest.approx(np.mean((0.5 * y) ** 2), rel=1e-6)
 
 
+@pytest.mark.parametrize("by", ["--reference", "--map"])
+def test_pictures_of_other_programs_are_compared_whole(
+    by: str, tmp_path: Path, frame: Frame
+) -> None:
+    source = tmp_path / "render.exr"
+    exr.write_channels(source, passes(frame))
+    out = write_output(tmp_path / "out" / "render.exr", 0.5 * frame.albedo, layer="")
+    clean = write_output(tmp_path / "clean.exr", frame.albedo, layer="")
+    given = (clean, {}) if by == "--reference" else (None, {"reference": str(clean)})
+    (scene,) = collect([source, out], 1, *given)
+    assert list(scene.images) == ["noisy", "out", "reference"]
+    np.testing.assert_array_equal(scene.images["noisy"], layouts.picture(passes(frame), ""))
+    right = np.mean((0.5 * np.float64(frame.albedo)) ** 2)
+    assert scene.measure("out")["mse"] == pytest.approx(right, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("case", "said"),
     [
         ("plain with frame", "holds no layer indirect"),
-        ("reference with frame", "--reference is for plain pictures"),
+        ("reference with frame", "--reference is for pictures"),
         ("sizes", "one size"),
         ("folder", "is a folder"),
     ],

@@ -37,7 +37,6 @@ async function loadScene(stored) {
     scene.images.push({
       ...image,
       light: await unpack(image.light, stored.unit),
-      direct: image.direct && (await unpack(image.direct, stored.unit)),
       flip: image.flip && (await inflate(image.flip)),
       canvases: {},
       radiance: {},
@@ -48,8 +47,7 @@ async function loadScene(stored) {
 
 /** Linear values of one view of an image: `reflected`, `picture` or `light`. */
 function radianceOf(scene, image, view) {
-  const { albedo, emission } = scene.layers,
-    direct = image.direct ?? scene.layers.direct;
+  const { albedo, direct, emission } = scene.layers;
   if (view === "light" || !albedo) return image.light;
   return (image.radiance[view] ??= image.light.map((value, i) =>
     view === "reflected"
