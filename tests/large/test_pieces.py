@@ -82,6 +82,7 @@ def test_options_of_flr_hold_in_strips(rng):
     "method, height, width",
     [
         ("flr-adaptive", 70, 3584),
+        ("auto", 70, 3584),
         ("flnr", 45, 3001),
         pytest.param("flnr-small", 83, 2710, marks=pytest.mark.slow),
     ],
