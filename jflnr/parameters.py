@@ -17,8 +17,9 @@ LARGEST = 1 << 20  # bytes of a file that are looked at
 
 def numbers_of(method: Any) -> dict[str, float]:
     """The numbers of a method by name."""
-    fields = dataclasses.fields(method)
-    return {f.name: float(getattr(method, f.name)) for f in fields if not f.metadata.get("static")}
+    fields = [f.name for f in dataclasses.fields(method) if not f.metadata.get("static")]
+    values = {name: getattr(method, name) for name in fields}
+    return {name: float(value) for name, value in values.items() if value is not None}
 
 
 def save_parameters(path: str | Path, method: Any, **about: Any) -> None:
