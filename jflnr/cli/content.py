@@ -106,7 +106,8 @@ class Pixels:
         self.denoised, self.why = self.denoised + count, self.why or why
         if whole:
             images = np.asarray(frame.beauty), picture
-            self.light += np.array([np.nansum(image, dtype=np.float64) for image in images])
+            good = np.isfinite(images[0]) & np.isfinite(picture)
+            self.light += [np.sum(image, dtype=np.float64, where=good) for image in images]
 
 
 def warnings_of(caught: Iterable[Any], pixels: Pixels) -> list[str]:

@@ -117,6 +117,7 @@ def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Part
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
     images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
+    images |= {"beauty": picture.beauty}
     # By rows, as parts of a frame are.
     images |= {"brightness": xp.broadcast_to(unit, (len(light), 1, 1))}
     if picture.colours is None:
@@ -236,10 +237,13 @@ def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
     in `Frame.lobes`, their colours, and what is emitted and seen of the environment, as planes of
     `(H, W, C)`.
 
-    image: `(H, W, 3)`. parts: with `error`, of the picture, if the method tells it.
+    image: `(H, W, 3)`; the beauty passes through where a layer that makes it is no number. parts:
+    with `error`, of the picture, if the method tells it.
     """
     alpha = parts["alpha"]
     xp: Any = image.__array_namespace__()
+    known = xp.all(xp.isfinite(image), axis=-1, keepdims=True)
+    image = xp.where(known, image, parts["beauty"])
     given = {"image": image if alpha is None else xp.concatenate([image, alpha], axis=-1)}
     if method.lobes:
         images = parts["lobes"], parts["colours"], parts["guides"][:LOBE_GUIDES], parts["weight"]

@@ -103,18 +103,36 @@ def test_info_counts_the_pixels_to_denoise(
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-@pytest.mark.parametrize("layer", ["albedo.G", "normal.Z", "depth.Z"])
+@pytest.mark.parametrize(
+    ("method", "layer", "told"),
+    [
+        *(("flr", layer, layer[:-2]) for layer in ("albedo.G", "normal.Z", "depth.Z")),
+        ("picture", "albedo.G", "seen_albedo"),
+        ("picture", "emission.G", "emitted"),
+    ],
+)
+@pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_is_no_number_passes_through(
-    tmp_path: Path, frame: Frame, layer: str, backend: str, capsys: pytest.CaptureFixture
+    tmp_path: Path,
+    frame: Frame,
+    method: str,
+    layer: str,
+    told: str,
+    value: float,
+    backend: str,
+    capsys: pytest.CaptureFixture,
 ) -> None:
     if backend == "opencl":
         pytest.importorskip("pyopencl")
     channels = picture_of(frame)
-    channels[layer][4:6, 5:10] = np.nan
+    channels |= {f"emission.{c}": 0 * channels["R"] for c in "RGB" if "emission" in layer}
+    channels[layer][4:6, 5:10] = value
     path, out = save(tmp_path / "a.exr", channels), tmp_path / "b.exr"
-    command = ["denoise", str(path), "-o", str(out), "--backend", backend, "--method", "flr"]
+    command = ["denoise", str(path), "-o", str(out), "--backend", backend, "--method", method]
     assert main(command) == 0
-    assert f"10 of {layer[:-2]}" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"10 of {told}" in said or (layer, value) == ("depth.Z", np.inf)
+    assert "the light of its input" not in said
     for name, pixels in exr.read_channels(out).items():
         assert np.isfinite(pixels).all()
         if name in "RGB":
