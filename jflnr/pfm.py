@@ -4,6 +4,8 @@ http://www.pauldebevec.com/Research/HDR/PFM/: three lines of text, then rows of 
 lowest to the highest.
 """
 
+import math
+import os
 import re
 from pathlib import Path
 
@@ -11,8 +13,16 @@ import numpy as np
 
 from jflnr.files import write_atomically
 
-# `PF` of three channels, `Pf` of one; width and height; below 0 the bytes are little-endian.
-HEADER = re.compile(rb"(P[Ff])\s+(\d{1,9})\s+(\d{1,9})\s+(-?[\d.eE+]+)\s")
+KINDS = {b"PF": "RGB", b"Pf": "Y"}
+# Kind, width and height; by what the numbers are to be multiplied, below 0 if they are
+# little-endian, as Open Image Denoise has it. It ends where the numbers begin: the first of them
+# may look like white space.
+HEADER = re.compile(
+    rb"(P[Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+)
+END = re.compile(rb"\s|\r\n")
+LONGEST = 256  # bytes of a header
+LEAST, MOST = float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max)
 
 
 def named(path: Path) -> bool:
@@ -25,15 +35,19 @@ def read(path: Path) -> dict[str, np.ndarray]:
 
     Raises OSError for a file that cannot be opened, ValueError for one that is none.
     """
-    data = path.read_bytes()
-    if (header := HEADER.match(data)) is None:
+    with path.open("rb") as file:
+        start, size = file.read(LONGEST), os.fstat(file.fileno()).st_size
+    if (header := HEADER.match(start)) is None:
         raise ValueError(f"{path} is not a PFM file")
-    names, order = "RGB" if header[1] == b"PF" else "Y", "<" if header[4][:1] == b"-" else ">"
-    width, height = int(header[2]), int(header[3])
-    if not 0 < 4 * width * height * len(names) == len(data) - header.end():
+    names, scale = KINDS[header[1]], float(header[4])
+    shape = int(header[3]), int(header[2]), len(names)
+    first = size - 4 * math.prod(shape)
+    end = END.fullmatch(start[header.end() : max(first, 0)])
+    if not (math.prod(shape) and end and LEAST <= abs(scale) <= MOST):
         raise ValueError(f"{path} is a truncated or damaged PFM file")
-    pixels = np.frombuffer(data, f"{order}f4", offset=header.end())
-    image = pixels.reshape(height, width, len(names))[::-1].astype(np.float32)
+    stored = np.fromfile(path, "<f4" if scale < 0 else ">f4", offset=first)
+    with np.errstate(all="ignore"):
+        image = (stored.reshape(shape)[::-1] * abs(scale)).astype(np.float32)
     return {name: image[..., i] for i, name in enumerate(names)}
 
 
