@@ -1,5 +1,6 @@
 """The command `jflnr`, and what ends it soon after Ctrl-C, whatever it is doing."""
 
+import contextlib
 import os
 import signal
 import sys
@@ -11,8 +12,8 @@ from typing import Any, NoReturn
 # How long the main thread may take to stop by itself, in seconds.
 PATIENCE = 1.0
 INTERRUPTED = 130
-# Of Ctrl-C, and of who runs programs for others.
-ENDING = (signal.SIGINT, signal.SIGTERM)
+# Of Ctrl-C, of who runs programs for others, and of a terminal that is closed.
+ENDING = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 # Bytes of compiled programs that are kept; the oldest go first.
 PROGRAMS = 1 << 28
 
@@ -96,10 +97,11 @@ def _end(listening: int) -> None:
 
 def _leave(words: str = "jflnr: interrupted; no partial file is left\n") -> NoReturn:
     """End the process at once, without a partial file."""
-    files = sys.modules.get("jflnr.files")
+    files: Any = sys.modules.get("jflnr.files")
     for path in list(getattr(files, "unfinished", ())):
-        path.unlink(missing_ok=True)
-    os.write(2, words.encode())
+        files.remove(path)
+    with contextlib.suppress(OSError):  # the terminal may be gone
+        os.write(2, words.encode())
     os._exit(INTERRUPTED)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from typing import Any
 
 # Deeper than any JSON of ours or of a renderer; what is deeper cannot be written again either.
 DEEPEST = 50
-# What has to be removed where the process ends in the midst of writing.
+# Files and folders to remove where the process ends in the midst of writing.
 unfinished: set[Path] = set()
 
 
@@ -29,21 +30,36 @@ def replacing(path: str | Path) -> Iterator[Path]:
     try:
         handle, name = tempfile.mkstemp(prefix=prefix, suffix=path.suffix, dir=path.parent)
         os.close(handle)
-        unfinished.add(beside := Path(name))
-        try:
+        with removed(beside := Path(name)):
             yield beside
             # A temporary file is private; what we leave behind follows the user's own umask.
             mask = os.umask(0)
             os.umask(mask)
             beside.chmod(0o666 & ~mask)
             beside.replace(path)
-        finally:
-            beside.unlink(missing_ok=True)
-            unfinished.discard(beside)
     except OSError as error:
         if error.strerror is None:  # a sentence of ours
             raise
         raise OSError(f"{path} cannot be written: {error.strerror}") from None
+
+
+@contextmanager
+def removed(path: Path) -> Iterator[None]:
+    """A file or folder that is not left behind, however this ends."""
+    unfinished.add(path)
+    try:
+        yield
+    finally:
+        remove(path)
+        unfinished.discard(path)
+
+
+def remove(path: Path) -> None:
+    """A file, or a folder with what is in it; it need not be there."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def write_atomically(path: str | Path, data: bytes) -> None:

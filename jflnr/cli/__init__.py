@@ -46,7 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
-        print("jflnr: interrupted; no partial file is left", file=sys.stderr)
+        with contextlib.suppress(OSError):
+            print("jflnr: interrupted; no partial file is left", file=sys.stderr)
         return 130
     except BrokenPipeError:  # `jflnr info ... | head`
         _drop_output()

@@ -16,10 +16,11 @@ what the ones before it left.
 
 import argparse
 import dataclasses
+import math
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import TextIO
@@ -28,7 +29,7 @@ from jflnr import layouts
 from jflnr.cli import shots, streams
 from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
-from jflnr.cli.jobs import Job, check_apart, plan
+from jflnr.cli.jobs import Job, borrowed, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
@@ -95,7 +96,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the picture only, also the denoised light (default), or all of the input too",
     )
     add("--reference", action="store_true", help="print metrics against the layer `reference`")
-    add("--fail-below", type=float, metavar="DB", help="a frame of less PSNR fails (--reference)")
+    add(
+        "--fail-below", type=decibels, metavar="DB", help="a frame of less PSNR fails (--reference)"
+    )
     add("--overwrite", action="store_true", help="replace outputs that exist")
     add("--json", action="store_true", help="print one JSON list instead of lines")
     add("--log", type=Path, metavar="FILE", help="add what is said to FILE, with the time")
@@ -115,22 +118,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def decibels(text: str) -> float:
+    """A number, of decibels."""
+    if math.isfinite(found := float(text)):
+        return found
+    raise ValueError
+
+
 def run(arguments: argparse.Namespace) -> int:
-    with streams.as_files(arguments) as of_files:
-        return _run(of_files, arguments.output == streams.STREAM)
+    with streams.as_files(arguments) as (of_files, named):
+        return _run(of_files, named, arguments.output == streams.STREAM)
 
 
-def _run(arguments: argparse.Namespace, piped: bool) -> int:
-    """piped: whether stdout is for the picture."""
+def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool) -> int:
+    """named: puts what the user named into a text. piped: whether stdout is for the picture."""
     from tqdm import tqdm
 
     from jflnr.large import memory
 
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
-    written = [*outputs, arguments.history, arguments.log]
-    check_apart([arguments.history, arguments.log], [*outputs, *(job.source for job in jobs)])
-    check_apart(written, [arguments.params, arguments.alb, arguments.nrm])
+    sources, others = [job.source for job in jobs], [arguments.history, arguments.log]
+    check_apart(others, [*outputs, *sources])
+    check_apart([arguments.log], [arguments.history])
+    check_apart([*outputs, *others], [arguments.params, *borrowed(arguments.map, sources)])
     bound = memory.parse(arguments.memory) if arguments.memory else None
     if len(jobs) > 1 and bound is None:
         memory.keep_freed()
@@ -138,17 +149,21 @@ def _run(arguments: argparse.Namespace, piped: bool) -> int:
     records, told, start = [], Counter[str](), time.perf_counter()
     with (
         voices() as (out, err),
-        open(arguments.log or os.devnull, "a", buffering=1, errors="backslashreplace") as log,
+        open(arguments.log or os.devnull, "ab", buffering=0) as log,
         tqdm(
             total=len(jobs), unit="frame", disable=arguments.quiet or None, leave=False, file=err
         ) as bar,
     ):
 
         def say(line: str, stream: TextIO | None) -> None:
+            line = named(line)
             if stream is not None:
                 bar.write(line, file=stream)
-            plain = COLOUR.sub("", line)
-            log.write(f"{datetime.now().isoformat(' ', 'seconds')} {plain}\n")
+            plain = f"{datetime.now().isoformat(' ', 'seconds')} {COLOUR.sub('', line)}\n"
+            try:
+                log.write(plain.encode(errors="backslashreplace"))
+            except OSError as error:
+                raise OSError(f"{arguments.log} cannot be written: {error.strerror}") from None
 
         loud, results = None if arguments.quiet else err, None if arguments.json or piped else out
         for record in _records(worker, jobs, arguments):
@@ -167,7 +182,7 @@ def _run(arguments: argparse.Namespace, piped: bool) -> int:
             say(throughput(records, worker.exr_seconds, seconds), err)
     if arguments.json:
         places = {str(job.source): place for place, job in enumerate(jobs)}
-        print(to_json(sorted(records, key=lambda record: places[record["input"]])))
+        print(named(to_json(sorted(records, key=lambda record: places[record["input"]]))))
     good = sum("error" not in record for record in records)
     return 0 if good == len(records) else SOME_FAILED if good else 2
 

@@ -175,7 +175,7 @@ class Worker:
             return _record(job) | denoise_in_strips(job, self._another(tile=tile), arguments, tile)
         denoiser = self.denoiser_for(frame, tile)
         method = denoiser.method_for(frame)
-        measured = arguments.reference or arguments.fail_below
+        measured = arguments.reference or arguments.fail_below is not None
         if measured and frame.reference is None:
             raise ValueError(
                 f"{job.source}: --reference needs a layer reference: of a whole picture --map "
@@ -227,7 +227,7 @@ class Worker:
                 name: measure(frame, np.asarray(image)) for name, image in images.items()
             }
             psnr, least = record["metrics"]["denoised"]["psnr"], arguments.fail_below
-            if least and not psnr >= least:
+            if least is not None and not psnr >= least:
                 raise ValueError(f"{job.source}: its PSNR of {psnr:.2f} dB is below {least:g}")
         return Denoised(job, source, frame, result, about, record)
 

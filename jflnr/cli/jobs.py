@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from jflnr.layouts.override import elsewhere
+
 # What a frame can be written as, and what it cannot.
 FILES = (".exr", ".pfm")
 PICTURES = (".png", ".jpg", ".jpeg", ".hdr", ".tif", ".tiff")
@@ -75,6 +77,12 @@ def make_folder(target: Path) -> None:
         tempfile.TemporaryFile(dir=target.parent).close()
     except OSError as error:
         raise OSError(f"{target} cannot be written: {error.strerror}") from None
+
+
+def borrowed(layers: Iterable[tuple[str, str]], sources: Iterable[Path]) -> list[Path]:
+    """The other files that `--map` takes layers of the frames `sources` from."""
+    found = (elsewhere(value, source) for source in sources for _, value in layers)
+    return [there[0] for there in found if there]
 
 
 def check_apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:

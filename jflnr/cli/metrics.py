@@ -47,16 +47,19 @@ def run(arguments: argparse.Namespace) -> int:
 def measure_files(a: Path, b: Path, spp: int, layers: Mapping[str, str]) -> dict[str, float | None]:
     """The metrics of file `a` against file `b`, as this module's docstring says."""
     from jflnr import exr, metrics
-    from jflnr.frame import read_frame
+    from jflnr.frame import frame_of
 
     exr.check_aligned(a, b)
-    channels_a, channels_b = exr.read_channels(a), exr.read_channels(b)
+    channels_a, source = exr.read_channels(a), layouts.load(b, spp, layers)
     picture = functools.partial(layouts.picture, channels_a, str(a))
-    if "reference" in {*exr.layers_of(channels_b), *layers}:
-        frame = read_frame(b, spp, layers)
+    if "reference" in {*exr.layers_of(source.channels), *layers}:
+        frame = frame_of(source)
         light = _light(channels_a, spp, a) if frame.beauty is None else picture()
         return metrics.measure(frame, light)
-    return metrics.compare(picture(), layouts.picture(channels_b, str(b)))
+    if "beauty" in layers:
+        names = source.layout.channels["beauty"]
+        return metrics.compare(picture(), layouts.layer(source.channels, "beauty", names, str(b)))
+    return metrics.compare(picture(), layouts.picture(source.channels, str(b)))
 
 
 def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr.cli.jobs import check_apart, expand, make_folder
+    from jflnr.cli.jobs import borrowed, check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import collect
 
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     if output.is_dir():
         raise IsADirectoryError(f"{output} is a folder; name the HTML file to write")
     paths = expand(arguments.inputs)
-    check_apart([output], [*paths, arguments.reference])
+    check_apart([output], [*paths, arguments.reference, *borrowed(arguments.map, paths)])
     if output.exists() and not arguments.overwrite:
         print(kept_as_it_is(output))
         return 0

@@ -2,10 +2,17 @@
 
 import argparse
 import contextlib
+import functools
+import os
+import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from jflnr import exr, pfm
+from jflnr.files import removed
+from jflnr.layouts.override import elsewhere
 
 STREAM = Path("-")
 # Layers by the options that Open Image Denoise's command has for them.
@@ -13,8 +20,13 @@ OF_OIDN = {"alb": "albedo", "nrm": "normal"}
 
 
 @contextlib.contextmanager
-def as_files(arguments: argparse.Namespace) -> Iterator[argparse.Namespace]:
-    """The arguments, with files as inputs and output; what comes out goes to stdout in the end."""
+def as_files(
+    arguments: argparse.Namespace,
+) -> Iterator[tuple[argparse.Namespace, Callable[[str], str]]]:
+    """The arguments, with files as inputs and output; what comes out goes to stdout in the end.
+
+    And a function that puts what the user named in place of these files in a text.
+    """
     trio = [arguments.hdr, *(getattr(arguments, option) for option in OF_OIDN)]
     inputs, output, layers = arguments.inputs, arguments.output, arguments.map
     if any(trio):
@@ -31,14 +43,36 @@ def as_files(arguments: argparse.Namespace) -> Iterator[argparse.Namespace]:
         raise ValueError("- stands for one frame, without others")
     if output == STREAM and (arguments.json or arguments.png or arguments.explain):
         raise ValueError("-o - writes one picture to standard output, without --json or --png")
-    with tempfile.TemporaryDirectory() as folder:
+    with removed(folder := Path(tempfile.mkdtemp())):
+        words: dict[Path, str] = {}
         if inputs == [STREAM]:
-            data = sys.stdin.buffer.read()
-            inputs = [Path(folder, "stdin.pfm" if data[:2] in (b"PF", b"Pf") else "stdin.exr")]
-            inputs[0].write_bytes(data)
-        target = Path(folder, "out", f"stdout{inputs[0].suffix}") if output == STREAM else output
+            inputs = [_received(folder)]
+            layers = [(name, _from_here(value)) for name, value in layers]
+            words[inputs[0]] = "standard input"
+        target = folder / "out" / f"stdout{inputs[0].suffix}" if output == STREAM else output
+        if output == STREAM:
+            words[target] = "standard output"
         changed = {"inputs": inputs, "output": target, "map": layers}
-        yield argparse.Namespace(**vars(arguments) | changed)
+        yield (
+            argparse.Namespace(**vars(arguments) | changed),
+            lambda text: functools.reduce(lambda t, at: t.replace(str(at), words[at]), words, text),
+        )
         if output == STREAM and target.exists():
             with open(1, "wb", closefd=False) as stdout:
                 stdout.write(target.read_bytes())
+
+
+def _received(folder: Path) -> Path:
+    """Standard input as a file; only the start of what is no picture, which may never end."""
+    start = sys.stdin.buffer.read(len(exr.MAGIC))
+    path = folder / f"stdin{'.pfm' if start[:2] in pfm.KINDS else '.exr'}"
+    with path.open("wb") as file:
+        file.write(start)
+        if start == exr.MAGIC or pfm.named(path):
+            shutil.copyfileobj(sys.stdin.buffer, file)
+    return path
+
+
+def _from_here(value: str) -> str:
+    """A value of `--map`, seen from the current folder if it is another file."""
+    return os.path.abspath(value) if elsewhere(value, STREAM) else value

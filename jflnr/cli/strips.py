@@ -72,7 +72,7 @@ def denoise_in_strips(
 
 def _check(arguments: argparse.Namespace) -> None:
     for option in ("png", "reference", "fail_below", "profile", "lobes"):
-        if getattr(arguments, option) not in (None, False):
+        if (value := getattr(arguments, option)) is not None and value is not False:
             raise ValueError(
                 f"--{option.replace('_', '-')} needs the whole frame in memory: raise --memory"
             )

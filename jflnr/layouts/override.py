@@ -46,13 +46,20 @@ def override(
     return replace(layout, channels=names | mapped, picture=picture)
 
 
+def elsewhere(value: str, path: Path) -> tuple[Path, str] | None:
+    """The other file that a value of `find` names, if it does, and what in it."""
+    if (match := FILE.fullmatch(value)) is None:
+        return None
+    return path.parent / match["file"].replace("{stem}", path.stem), match["name"] or ""
+
+
 def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) -> tuple[str, ...]:
     """The channels that `value` means; those of another file are added to `channels`."""
-    if match := FILE.fullmatch(value):
-        other = path.parent / match["file"].replace("{stem}", path.stem)
+    if there := elsewhere(value, path):
+        other, inside = there
         exr.check_aligned(path, other)
         read = exr.read_channels(other)
-        found = _choose(read, name, match["name"] or "", str(other))
+        found = _choose(read, name, inside, str(other))
         borrowed = {f"{BORROWED}{other}:{channel}": read[channel] for channel in found}
         channels |= borrowed
         return tuple(borrowed)

@@ -71,6 +71,8 @@ def collect(
     channels = {path: exr.read_channels(path) for path in paths}
     frames = [path for path in paths if not _is_picture(channels[path])]
     pictures = [path for path in paths if path not in frames]
+    if not frames and layers:
+        raise ValueError(f"--map is for frames, and {paths[0]} is a picture")
     if not frames:
         name = paths[0].stem if len(paths) == 1 else "pictures"
         return [Scene(name, _plain(_names(pictures), channels, reference))]

@@ -105,6 +105,34 @@ def test_streams_and_pictures_that_do_not_go_together(
     assert message in capsys.readouterr().err
 
 
+def test_standard_input_is_called_that(frame_file: Path) -> None:
+    """Also where it never ends; and other files are seen from the current folder."""
+    folder = frame_file.parent
+    for line, end, words in (
+        ("yes |", "", b"is not an EXR file"),
+        ("", "0<&-", b"is empty (0 bytes)"),
+        ("head -c 2000 frame.exr |", "", b"is truncated or damaged"),
+        ("cat frame.exr |", "--map albedo=frame.exr:nothing", b"there is no nothing for albedo"),
+    ):
+        done = shell(f"ulimit -v 8000000; {line} {JFLNR} denoise - -o out.exr {end}", folder)
+        assert done.returncode == 2 and words in done.stderr
+        assert done.stderr.startswith(b"jflnr: standard input") and done.stderr.count(b"\n") == 1
+    line = f"cat frame.exr | {JFLNR} denoise - -o out.exr --json --map albedo=frame.exr:albedo"
+    done = shell(line, folder)
+    assert done.returncode == 0 and json.loads(done.stdout)[0]["input"] == "standard input"
+    assert {path.name for path in folder.iterdir()} == {"frame.exr", "out.exr"}
+
+
+def test_a_log_that_cannot_be_written_is_named(
+    frame_file: Path, capsys: pytest.CaptureFixture
+) -> None:
+    out = frame_file.with_name("out.exr")
+    assert main(["denoise", str(frame_file), "-o", str(out), "--log", "/dev/full"]) == 2
+    assert capsys.readouterr().err == (
+        "jflnr: /dev/full cannot be written: No space left on device\n"
+    )
+
+
 # Not UTF-8, what a terminal obeys, what HTML and JSON quote, what a line ends with.
 NAMES = [b"caf\xe9", b"red\x1b[31m", b"\"'<b>&amp;", b"a\nb", b"two  spaces"]
 
@@ -336,7 +364,7 @@ def never():""",
 IMPORTING = "print('ready', flush=True)\nimport time\ntime.sleep(60)"
 
 
-@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("where", ["stuck", "collecting", "importing"])
 def test_an_interruption_ends_it(tmp_path: Path, where: str, kind: int) -> None:
     (tmp_path / "modules" / "numpy").mkdir(parents=True)
@@ -363,6 +391,23 @@ def test_an_interruption_ends_it(tmp_path: Path, where: str, kind: int) -> None:
     assert not list((tmp_path / "folder").iterdir())
 
 
+def test_it_ends_also_where_nobody_hears_it(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", STUCK],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout is not None and process.stderr is not None
+    assert process.stdout.readline() == b"ready\n"
+    process.stderr.close()
+    process.terminate()
+    assert process.wait(timeout=30) == 130
+    assert not list(tmp_path.iterdir())
+    process.stdout.close()
+
+
 @pytest.mark.parametrize(
     "line",
     [
@@ -376,6 +421,11 @@ def test_an_interruption_ends_it(tmp_path: Path, where: str, kind: int) -> None:
         "denoise a.exr -o out --temporal --history a.exr",
         "denoise a.exr -o out --temporal --history out/a.exr",
         "denoise a.exr -o p.exr --params p.exr --overwrite",
+        "denoise a.exr -o b.exr --map albedo=b.exr:albedo --overwrite",
+        "denoise a.exr -o out --map albedo={stem}.exr:albedo --log a.exr",
+        "denoise a.exr -o out --map albedo=b.exr --log b.exr",
+        "denoise a.exr -o out --history w.npz --log w.npz",
+        "report a.exr -o b.exr --map reference=b.exr --overwrite",
     ],
 )
 def test_no_output_replaces_an_input(
