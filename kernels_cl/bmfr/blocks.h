@@ -7,6 +7,8 @@
 #define SQUARES 3                     // of the position, the last guides
 #define RANGES (Q + SQUARES)          // features that are scaled
 #define M (1 + RANGES)                // columns of T
+// Light is fitted times this, or sums over a block would leave float32 near its end.
+#define LESS 0x1p-16f
 #define ONE_BLOCK (2 * RANGES)        // in `ranges` (h, w, RANGES, 2): lowest value, and how far up
 
 INLINE real to_unit(real x, float low, float spread)

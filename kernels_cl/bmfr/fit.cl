@@ -112,7 +112,7 @@ INLINE void load(
             reach[2 * q + 1] = here.there ? MAX(reach[2 * q + 1], x) : reach[2 * q + 1];
         }
 #pragma unroll
-        for (int c = 0; c < C; ++c) A(M + c, p) = here.used ? here.z[c] : (real)0;
+        for (int c = 0; c < C; ++c) A(M + c, p) = here.used ? LESS * here.z[c] : (real)0;
     }
     find_ranges(reach, 0, Q, 0, worker, partial, ranges);
 }

@@ -42,7 +42,7 @@ kernel void weighted_sum(
     }
 #pragma unroll
     for (int c = 0; c < C; ++c) {
-        sums[c] = sums[c] < 0 ? (real)0 : sums[c];  // NaN stays
+        sums[c] = sums[c] < 0 ? (real)0 : sums[c] / LESS;  // NaN stays
         sums[c] = there ? sums[c] : (real)0;
     }
     if (first == 0 && last == WIDTH - 1)

@@ -53,6 +53,17 @@ def test_a_sequence(context: Context, frames: list[jflnr.Frame], block: int) -> 
     compare(context, frames, block=block)
 
 
+def test_light_near_the_end_of_the_type(context: Context, frames: list[jflnr.Frame]) -> None:
+    """A fit is linear in light, also where sums over a block would leave float32."""
+    frame, large = frames[0], 2.0**120
+    bright = dataclasses.replace(frame, indirect=frame.indirect * np.float32(large))
+    wanted, found = (
+        kernels.step(kernels.start(one, context), one, context=context)[1]
+        for one in (frame, bright)
+    )
+    np.testing.assert_array_equal(found / large, wanted)
+
+
 @pytest.mark.parametrize("size", [(1, 1), (64, 7)])
 def test_sizes(context: Context, size: tuple[int, int]) -> None:
     compare(context, shot(2, *size), block=16)
