@@ -61,7 +61,9 @@ class Scanlines:
         self.path, self.attributes = path, exr.read_attributes(path)
         self.file = _opened(path)
         if self.file is None:
-            raise ValueError(f"{path} cannot be read in parts: it is damaged")
+            # Taken, or it is printed at the end of the process.
+            why = next(iter(_openimageio().geterror().splitlines()), "it is damaged")
+            raise ValueError(f"{path} cannot be read in parts: {why}")
         spec = self.file.spec()
         if self.attributes.parts > 1 or spec.tile_width:
             raise ValueError(

@@ -304,6 +304,23 @@ def test_frames_of_too_little_psnr_fail(
 
 
 @pytest.mark.usefixtures("stand_in")
+def test_a_bound_of_no_decibels_is_one(
+    tmp_path: Path, frame: Frame, capsys: pytest.CaptureFixture[str]
+) -> None:
+    poor = dataclasses.replace(frame, reference=1e4 * frame.indirect)
+    write_frame(tmp_path / "a.exr", poor)
+    exact = dataclasses.replace(frame, reference=frame.indirect)
+    write_frame(tmp_path / "b.exr", exact)
+    command = tmp_path / "a.exr", tmp_path / "b.exr", "-o", tmp_path / "out", "--fail-below"
+    assert run(*command, 0, "--json") in (0, 3)
+    assert all("metrics" in r for r in json.loads(capsys.readouterr().out) if "error" not in r)
+    for value in ("nan", "inf"):
+        with pytest.raises(SystemExit) as left:
+            run(*command, value)
+        assert left.value.code == 2
+
+
+@pytest.mark.usefixtures("stand_in")
 def test_what_many_frames_have_is_said_once(
     tmp_path: Path, frame: Frame, capsys: pytest.CaptureFixture[str]
 ) -> None:

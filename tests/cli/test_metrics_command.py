@@ -61,6 +61,24 @@ def test_a_reference_from_elsewhere(
     assert measured(capsys, whole, "--map", f"reference={other}") == pytest.approx(right, rel=1e-4)
 
 
+def test_what_is_mapped_counts_for_pictures_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    x = np.random.default_rng(0).random((9, 8, 3)).astype(np.float32)
+    channels = {f"{layer}{c}": x[..., i] for layer in ("", "clean.") for i, c in enumerate("RGB")}
+    exr.write_channels(tmp_path / "b.exr", channels | {"R": 1 - x[..., 0]})
+    a, b = write(tmp_path / "a.exr", "", x), tmp_path / "b.exr"
+    assert measured(capsys, a, b)["mse"] > 0
+    assert measured(capsys, a, b, "--map", "beauty=clean")["mse"] == 0
+    for line in (
+        ["metrics", str(a), str(b), "--map", "nothing=clean"],
+        ["metrics", str(a), str(b), "--map", "beauty=nothing"],
+        ["report", str(a), "-o", str(tmp_path / "page"), "--map", "albedo=R"],
+    ):
+        assert main(line) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+
+
 def test_an_infinite_psnr_is_null_in_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -123,6 +123,18 @@ def test_standard_input_is_called_that(frame_file: Path) -> None:
     assert {path.name for path in folder.iterdir()} == {"frame.exr", "out.exr"}
 
 
+def test_a_damaged_file_in_pieces_is_one_sentence(frame_file: Path) -> None:
+    """Also what a library says at the end of a process."""
+    pytest.importorskip("OpenImageIO")
+    content = frame_file.read_bytes()
+    at = content.index(exr.DATA_WINDOW) + len(exr.DATA_WINDOW) + 8
+    size = np.array([29_999, 29_999], "<i4").tobytes()
+    frame_file.write_bytes(content[:at] + size + content[at + 8 :])
+    done = shell(f"{JFLNR} {DENOISE} --memory 2G", frame_file.parent)
+    assert done.returncode == 2
+    assert done.stderr.count(b"\n") == 1 and b"frame.exr" in done.stderr
+
+
 def test_a_log_that_cannot_be_written_is_named(
     frame_file: Path, capsys: pytest.CaptureFixture
 ) -> None:
