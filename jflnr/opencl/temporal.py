@@ -18,7 +18,7 @@ from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import PAST, State, Temporal, prepared
+from jflnr.temporal.sequence import PAST, TURNED, State, Temporal, prepared
 
 
 def start(frame: Frame, context: Context | None = None) -> State:
@@ -101,8 +101,8 @@ def reproject(
     places = [s.normal if depths else s.position for s in (surface, before)]
     arguments = (
         width, height, OFF_PLANE, SAME_NORMAL, motion, surface.normal, surface.depth, places[0],
-        before.normal, before.depth, places[1], covered, *state.light, *state.image, *light,
-        *image, expected, known,
+        before.normal, before.depth, places[1], *TURNED, covered, *state.light, *state.image,
+        *light, *image, expected, known,
     )  # fmt: skip
     defines = guide_defines((), 3) | brightness_defines(3) | ({"DEPTHS": 1} if depths else {})
     run_on_rows(context, "reproject", "temporal/reproject.cl", defines, arguments)

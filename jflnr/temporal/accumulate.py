@@ -41,6 +41,12 @@ def reproject(average: Average, taps: Taps) -> Average:
     return Average(*(gather(taps, image) for image in average))
 
 
+def less_sure(average: Average, noise: Array) -> Average:
+    """An average that takes on `noise`, `(H, W, 1)`, in variances of one frame."""
+    mean, n = average
+    return Average(mean, n / (1 + noise * n))
+
+
 def accumulate(before: Average, image: Array, least: Array | float) -> Average:
     """The average with one more frame in it.
 

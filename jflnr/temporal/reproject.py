@@ -112,6 +112,25 @@ def gather(taps: Taps, image: Array) -> jax.Array:
     return total
 
 
+def own_turn(taps: Taps, here: Surface, before: Surface) -> jax.Array:
+    """How far each pixel's surface has turned by itself since the previous frame, `(H, W, 1)`.
+
+    The squared length of its normal's change: radians squared where that is small. None of it
+    counts where the point stayed within half a pixel's width in space, as under a camera alone, and
+    all where it went one; without positions, all everywhere.
+    """
+
+    def change(now: Array, then: Array) -> jax.Array:
+        return jnp.sum((jnp.asarray(now) - gather(taps, then)) ** 2, axis=-1, keepdims=True)
+
+    turn = change(here.normal, before.normal)
+    if here.position is not None and before.position is not None:
+        pixel = jnp.asarray(here.depth) / here.depth.shape[1]
+        moved = divide(change(here.position, before.position), pixel**2)
+        turn *= jnp.clip(4 * moved - 1, 0, 3) / 3
+    return jnp.where(taps.seen & jnp.isfinite(turn), turn, 0)
+
+
 def _take(image: Array, pixel: jax.Array) -> jax.Array:
     return jnp.asarray(image).reshape(-1, image.shape[-1])[pixel]
 

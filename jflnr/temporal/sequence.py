@@ -17,9 +17,13 @@ from jflnr.images.inputs import prepare
 from jflnr.methods import default_of, method_of
 from jflnr.regression.adaptive import light_of
 from jflnr.stages import compose, regress
-from jflnr.temporal.accumulate import Average, accumulate, nothing, reproject
+from jflnr.temporal.accumulate import Average, accumulate, less_sure, nothing, reproject
 from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
-from jflnr.temporal.reproject import Surface, find_taps
+from jflnr.temporal.reproject import Surface, find_taps, own_turn
+
+# Variances of one frame that the averaged light and the averaged result, which has less noise, take
+# on by the squared turn of their surface: what falls on it depends on where it faces.
+TURNED = 20.0, 100.0
 
 
 class Temporal(NamedTuple):
@@ -123,7 +127,11 @@ def _step(
     images = method.images(frame, names)
     target, weight = jnp.asarray(images["target"]), images["weight"]
     taps = find_taps(motion, surface, state.surface)
-    light, image = reproject(state.light, taps), reproject(state.image, taps)
+    turn, averages = own_turn(taps, surface, state.surface), (state.light, state.image)
+    light, image = (
+        less_sure(reproject(average, taps), turned * turn)
+        for average, turned in zip(averages, TURNED, strict=True)
+    )
     known, covered = light.samples[..., 0] > 0, True if weight is None else weight > 0
     change, evidence = find_change(
         target - light.mean,
@@ -147,4 +155,4 @@ def _step(
 def _changed(average: Average, change: Change) -> Average:
     """An average that follows the light."""
     mean, n = average
-    return Average(jnp.where(n > 0, mean + change.signal, 0), n / (1 + change.noise * n))
+    return less_sure(Average(jnp.where(n > 0, mean + change.signal, 0), n), change.noise)

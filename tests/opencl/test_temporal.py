@@ -25,8 +25,14 @@ GUIDES = ("normal", "depth")
 
 @pytest.fixture(scope="module")
 def frames() -> list[jflnr.Frame]:
-    """Of a light that is switched on, with lost samples, and unknown motion."""
+    """Of a light that is switched on, with lost samples, unknown motion, and walls that turn and
+    slide by some pixels."""
     frames = shot(4, 45, 70)
+    for i, frame in enumerate(frames):
+        sine, cosine = np.sin(0.2 * i), np.cos(0.2 * i)
+        turn = np.float32([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+        slid = frame.position + np.float32([0.025 * i, 0, 0])
+        frames[i] = dataclasses.replace(frame, normal=frame.normal @ turn, position=slid)
     for i, factor in ((1, 1), (2, 4), (3, 4)):
         light = factor * frames[i].indirect
         light[10:14, 20:31] = np.nan if i == 1 else light[10:14, 20:31]

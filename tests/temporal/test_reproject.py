@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jflnr.temporal import Surface, find_taps, gather
+from jflnr.temporal.reproject import own_turn
 
 HEIGHT, WIDTH = 12, 16
 
@@ -61,6 +62,20 @@ def test_as_by_hand() -> None:
     assert 0.2 < seen.mean() < 0.9
     np.testing.assert_array_equal(taps.seen, seen)
     np.testing.assert_allclose(gather_jit(taps, texture()), wanted, atol=2e-5)
+
+
+def test_a_turn_counts_where_the_surface_moved_by_itself() -> None:
+    """By 0.3, of points that have moved by a half, three quarters and one pixel and more."""
+    turned = FLAT._replace(normal=np.broadcast_to(np.float32([0, 0.3, -1]), FLAT.normal.shape))
+    pixel = 2 / WIDTH
+    for moved, share in ((0, 0), (0.45, 0), (0.75, 1.25 / 3), (1.1, 1), (9, 1)):
+        gone = turned._replace(position=FLAT.position + np.float32([moved * pixel, 0, 0]))
+        turn = own_turn(find_jit(constant(0, 0), gone, FLAT), gone, FLAT)
+        np.testing.assert_allclose(turn, 0.09 * share, atol=1e-5)
+    assert not own_turn(find_jit(constant(99, 0), gone, FLAT), gone, FLAT).any()
+    flat, gone = (surface._replace(position=None) for surface in (FLAT, turned))
+    turn = own_turn(find_jit(constant(0, 0), gone, flat), gone, flat)
+    np.testing.assert_allclose(turn, 0.09, rtol=1e-5)
 
 
 def test_whole_pixels_move_the_image_exactly() -> None:
