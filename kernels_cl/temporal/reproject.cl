@@ -7,7 +7,8 @@
 #include "bmfr/taps.h"
 #include "temporal/surface.h"
 
-// What an average holds there: its mean and its number of samples, more `noise` taken on.
+// What an average holds there: its mean and its number of samples, less for the `noise`
+// that it takes on.
 INLINE real move(
     global const float *mean, global const float *samples, const Taps *taps, real noise, long pixel,
     global float *moved_mean, global float *moved_samples, real *found)
@@ -46,15 +47,14 @@ INLINE real own_turn(const Taps *taps, long pixel, int width, SURFACE_PARAMETERS
 
 // Global size (W / WIDTH, H). Means, normals and positions (H, W, 3), motion (H, W, 2), all others
 // (H, W). surface: above 0 where samples count. expected: brightness of the image there. known: 1
-// where samples count and there is a history, else 0. turned, image_turned:
-// noise of both by the square of a turn.
+// where samples count and there is a history, else 0. turned, image_turned: noise
+// that the averages take on by the square of a turn.
 kernel void reproject(
     int width, int height, SURFACE_PARAMETERS, float turned, float image_turned,
-    global const float *surface,
-    global const float *light, global const float *light_samples, global const float *image,
-    global const float *image_samples, global float *moved_light, global float *moved_light_samples,
-    global float *moved_image, global float *moved_image_samples, global float *expected,
-    global float *known)
+    global const float *surface, global const float *light, global const float *light_samples,
+    global const float *image, global const float *image_samples, global float *moved_light,
+    global float *moved_light_samples, global float *moved_image,
+    global float *moved_image_samples, global float *expected, global float *known)
 {
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
