@@ -28,6 +28,7 @@ TABLES = {
     "rmse": "RMSE",
     "temporal": "temporal error",
     "lag": "lag, frames",
+    "moving": "PSNR of what moves, dB",
 }
 MARGIN = {
     "flnr": "FLNR frame by frame",
@@ -87,6 +88,8 @@ def measured(shot: shots.Shot, lights: list[np.ndarray]) -> dict[str, Any]:
     if shot.motion == "switch":
         response = temporal_metrics.response(images, truth[0], truth[-1])
         found["lag"] = float(np.sum(1 - response[len(truth) // 2 :]))
+    if shot.motion == "object":
+        found["moving"] = temporal_metrics.moving(shot.frames, lights)
     if shot.motion in ("camera", "object"):
         found["recovery"] = temporal_metrics.recovery(shot.frames, lights)
     return found

@@ -25,6 +25,9 @@ STEPS = 10
 # Frames since a place was first seen, and how they are grouped.
 AGES = {"0": (0, 1), "1 to 3": (1, 4), "4 to 7": (4, 8), "8 and more": (8, np.inf)}
 
+# What moves less, in pixels, stands still.
+STILL = 0.3
+
 _find_taps = jax.jit(find_taps)
 
 
@@ -179,19 +182,34 @@ def recovery(frames: Sequence[Frame], lights: Sequence[Array]) -> dict[str, floa
 
     Pixels outside the mask and those in view since the first frame are left out.
     """
+    error, age = _squared_errors(frames, lights), ages(frames)
+    return {name: _psnr(error[(age >= low) & (age < high)]) for name, (low, high) in AGES.items()}
+
+
+def moving(frames: Sequence[Frame], lights: Sequence[Array]) -> float | None:
+    """PSNR of the displayed pixels that move across the picture; None without any.
+
+    Under a still camera those of an object. Pixels outside the mask are left out.
+    """
+    speed = np.stack([np.abs(np.asarray(frame.motion)).max(axis=-1) for frame in frames])
+    return _psnr(_squared_errors(frames, lights)[speed > STILL])
+
+
+def _squared_errors(frames: Sequence[Frame], lights: Sequence[Array]) -> np.ndarray:
+    """Of displayed pixels, `(T, H, W)`; NaN outside the mask."""
     scale, errors = sequence_exposure(frames), []
     for frame, light in zip(frames, lights, strict=True):
         shown = [_displayed(frame, image, scale) for image in (light, frame.reference)]
-        errors.append(np.mean((shown[0] - shown[1]) ** 2, axis=-1))
-    error, age = np.stack(errors), ages(frames)
-    inside = np.stack(
-        [np.ones(error.shape[1:]) if f.mask is None else f.mask[..., 0] for f in frames]
-    )
-    found: dict[str, float | None] = {}
-    for name, (low, high) in AGES.items():
-        chosen = error[(age >= low) & (age < high) & (inside > 0)]
-        found[name] = float(-10 * np.log10(chosen.mean())) if chosen.size else None
-    return found
+        error = np.mean((shown[0] - shown[1]) ** 2, axis=-1)
+        inside = True if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
+        errors.append(np.where(inside, error, np.nan))
+    return np.stack(errors)
+
+
+def _psnr(errors: np.ndarray) -> float | None:
+    """Of squared errors that are known; None without any."""
+    known = errors[np.isfinite(errors)]
+    return float(-10 * np.log10(known.mean())) if known.size else None
 
 
 def _reflected(frame: Frame, light: Array | None) -> np.ndarray:

@@ -138,6 +138,17 @@ def test_ages_and_recovery() -> None:
     assert found["0"] < found["1 to 3"] and found["4 to 7"] is None
 
 
+def test_what_moves_is_measured_alone() -> None:
+    """In the third frame all moves, in the others nothing."""
+    frames = shot([0, 0, 4, 0, 0])
+    scale = exposure(np.stack([frame.albedo * frame.reference for frame in frames]))
+    lights = [(1.2 if i == 2 else 3.0) * frame.reference for i, frame in enumerate(frames)]
+    shown, true = (display(frames[2].albedo * x, scale) for x in (lights[2], frames[2].reference))
+    wanted = -10 * np.log10(np.mean((shown - true) ** 2))
+    assert temporal_metrics.moving(frames, lights) == pytest.approx(wanted, abs=1e-3)
+    assert temporal_metrics.moving(frames[:2], lights[:2]) is None
+
+
 def test_wrong_sequences_are_refused() -> None:
     frames = shot([0, 0])
     light = frames[0].reference
