@@ -267,9 +267,10 @@ class Denoiser:
         if self.backend == "opencl":
             options["context"] = self.context
             name = f"jflnr.opencl.{method.name if own else 'temporal'}"
-        home, guides = importlib.import_module(name), {} if own else {"guides": self.guides}
-        step = functools.partial(home.step, method=method, **guides, **options)
-        return functools.partial(home.start, **options), step
+        home, taken = importlib.import_module(name), {} if own else {"guides": self.guides}
+        step = functools.partial(home.step, method=method, **taken, **options)
+        taken |= {} if own else {"method": method}
+        return functools.partial(home.start, **taken, **options), step
 
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:

@@ -188,3 +188,13 @@ INLINE void write_pixels(global output_t *p, const real *values, int first, int 
 #endif
     }
 }
+
+// Writes Q channels of WIDTH pixels; p points to the first channel of lane 0.
+INLINE void write_guides(global float *p, const real *values)
+{
+#pragma unroll
+    for (int q = 0; q < Q; ++q) {
+#define WRITE_GUIDE(i) (p[(i) * Q + q] = LANE(values[q], i), 0)
+        (void)LANES(mask, WRITE_GUIDE);
+    }
+}

@@ -22,6 +22,7 @@ from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
 from jflnr.regression import adaptive
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
+from jflnr.regression.apply import guides_to_map
 from jflnr.regression.arguments import layers_of
 from jflnr.regression.moments import Guides
 from jflnr.stages import Known, Parts, Stage
@@ -39,7 +40,8 @@ LARGEST = 1.5
 def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
     """The images that the network reads, from those of adaptive FLR and its results, and the unit
     of their light."""
-    target, guides = parts["target"], jnp.concatenate(layers_of(parts["guides"]), axis=-1)
+    target = parts["target"]
+    guides = jnp.concatenate(layers_of(guides_to_map(parts)), axis=-1)
     usable = jnp.all(jnp.isfinite(target), axis=-1) & jnp.all(jnp.isfinite(guides), axis=-1)
     if parts["weight"] is not None:
         usable &= parts["weight"] > 0

@@ -30,7 +30,7 @@ from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weigh import collect_blocks
 from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
-from jflnr.regression.arguments import channel_count, check_regression
+from jflnr.regression.arguments import channel_count, check_same_size
 from jflnr.regression.auto import Auto
 
 
@@ -70,6 +70,7 @@ def run_on_images(
     guides: Any,
     method: Any,
     *,
+    guides_map: Any | None = None,
     weight: Any | None = None,
     context: Context | None = None,
     out: Any | None = None,
@@ -80,11 +81,13 @@ def run_on_images(
     and its error to another one or to none."""
     context = default_context() if context is None else context
     method = dataclasses.replace(method, **options)
-    check_regression(target, guides, None, weight)
+    check_same_size(target, guides, guides_map, weight)
     method = method.ready(check_guides(guides), target.shape[2])
     output, result = to_output(context, target.shape, out, on_device)
     pixels, unit = in_unit(target)
-    images = context.array(pixels), to_layers(context, guides), to_weight(context, weight)
+    fitted = to_layers(context, guides)
+    mapped = fitted if guides_map is None else to_layers(context, guides_map)
+    images = context.array(pixels), fitted, to_weight(context, weight), mapped
     error = told = None
     if method.with_error:
         error, told = to_output(context, (*target.shape[:2], 1), None, on_device)
@@ -101,7 +104,7 @@ def write(
 ) -> None:
     """Write the light, `(H, W, C)`, with the brightness of the input if that is to be kept, and, if
     that is not None, its error."""
-    target, _, weight = images
+    target, _, weight, _ = images
     image = context.empty(target.shape) if method.keep_energy else output
     write_light(context, *images, method, image, error)
     if method.keep_energy:
@@ -130,6 +133,7 @@ def write_light(
     target: Any,
     guides: tuple[Any, ...],
     weight: Any | None,
+    guides_map: tuple[Any, ...],
     method: AdaptiveFLR,
     image: Any,
     error: Any | None = None,
@@ -141,12 +145,12 @@ def write_light(
     block, shift, numbers = method.finest, centre(context, guides), numbers_of(method)
     run = Run(context, channel_count(guides), target.shape[2], numbers, shift, None)
     collect = collect_blocks if isinstance(method, Auto) else collect_pixels
-    run, light, grid = collect(run, (target, guides, weight), block)
+    run, light, grid = collect(run, (target, guides, weight, guides_map), block)
     w = -(-target.shape[1] // (2 * block))
     steps, merged = fit_levels(run, grid, block, method.levels)
     scale, own = restore(run, merged, light, w), own_light(run, merged, grid)
     restored = Restored(*scale, own, run.numbers.floor)
-    apply(context, merged.planes, guides, shift, block, merged.sizes, image, restored)
+    apply(context, merged.planes, guides_map, shift, block, merged.sizes, image, restored)
     if error is not None:
         standard_error(run, steps, scale, own, block, error)
     return run
@@ -154,7 +158,7 @@ def write_light(
 
 def collect_pixels(run: Run, images: Images, block: int) -> tuple[Run, Any, Grid]:
     """Passes 1 and 2; all as of `collect_blocks`."""
-    target, guides, weight = images
+    target, guides, weight, _ = images
     light = collect(run.context, target, guides, run.shift, 2 * block, weight, light=True)
     w = -(-target.shape[1] // (2 * block))
     run = run._replace(mean=frame_mean(run.context, light, w, run.guides, run.channels))

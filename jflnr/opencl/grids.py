@@ -11,8 +11,9 @@ from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.level import brightness
 from jflnr.regression.window import REACH
 
-# The light, the guides and what each pixel counts, on the device.
-Images: TypeAlias = "tuple[Any, tuple[Any, ...], Any | None]"
+# The light, the guides of the fit, what each pixel counts and the guides that models are evaluated
+# on, on the device.
+Images: TypeAlias = "tuple[Any, tuple[Any, ...], Any | None, tuple[Any, ...]]"
 # Neighbours whose planes lie together.
 GROUP = 8
 

@@ -13,15 +13,21 @@ from jflnr.opencl import twins
 from jflnr.opencl.arguments import to_device, to_layers
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
-from jflnr.opencl.moments import guide_defines, run_on_rows
+from jflnr.opencl.moments import guide_arguments, guide_defines, run_on_rows
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import PAST, TURNED, State, Temporal, prepared
+from jflnr.temporal.sequence import MODEL, PAST, TURNED, State, Temporal, guide_count, prepared
 
 
-def start(frame: Frame, context: Context | None = None) -> State:
+def start(
+    frame: Frame,
+    method: Any = None,
+    *,
+    guides: Sequence[str] | None = None,
+    context: Context | None = None,
+) -> State:
     """`jflnr.temporal.start`, on the device, of one light group."""
     context = default_context() if context is None else context
     checks.image("indirect", frame.indirect, 3)
@@ -29,7 +35,8 @@ def start(frame: Frame, context: Context | None = None) -> State:
     zeros = lambda channels: context.array(np.zeros((height, width, channels), np.float32))
     surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))
     light, image = (Average(zeros(3), zeros(1)) for _ in range(2))
-    return State(surface, light, image, no_evidence(context, height, width))
+    count = guide_count(frame, method, guides)
+    return State(surface, light, zeros(count), image, no_evidence(context, height, width))
 
 
 @one_sentence
@@ -62,20 +69,22 @@ def step(
     weight = frame.depth * 0 + 1 if given["weight"] is None else given["weight"][..., None]
     covered = to_device(context, np.asarray(weight, np.float32))
 
-    light, image, expected, known = reproject(context, state, surface, motion, covered)
+    light, kept, image, expected, known = reproject(context, state, surface, motion, covered)
     change, evidence = find_change(
         context, sample, light.mean, expected, known, covered, layers, state.evidence,
         temporal.caution,
     )  # fmt: skip
     least = temporal.light, temporal.image
-    light, weight = accumulate(context, light, change, sample, covered, least[0])
-    images = {"target": light.mean, "guides": layers, "weight": weight}
+    light, weight, kept = accumulate(
+        context, light, change, sample, covered, least[0], kept, layers
+    )
+    images = {"target": light.mean, "guides": kept, "guides_map": layers, "weight": weight}
     fitted = twins.regress(method, images, context, to_picture=False, on_device=True)
-    image, _ = accumulate(context, image, change, fitted["image"], covered, least[1])
+    image, *_ = accumulate(context, image, change, fitted["image"], covered, least[1])
     result: Any = image.mean
     averaged: Any = light.mean
     context.finish(result, result)
-    state = State(surface, light, image, evidence)
+    state = State(surface, light, kept, image, evidence)
     averages = {"target": averaged.get(), "weight": weight.get(), "image": result.get()}
     averages |= {"error": fitted["error"].get()} if "error" in fitted else {}
     if "image" in (shown := compose(method, given | averages, twins.known_on(context))):
@@ -86,8 +95,8 @@ def step(
 
 def reproject(
     context: Context, state: State, surface: Surface, motion: Any, covered: Any
-) -> tuple[Average, Average, Any, Any]:
-    """Both averages where their pixels are now; brightness of the image there, `(H, W)`; and 1
+) -> tuple[Average, Any, Average, Any, Any]:
+    """The averages where their pixels are now; brightness of the image there, `(H, W)`; and 1
     where there is a history and something to denoise, else 0, `(H, W)`.
 
     covered: `(H, W, 1)`, above 0 where there is something to denoise.
@@ -95,38 +104,49 @@ def reproject(
     height, width = motion.shape[:2]
     light, image = (_new_average(context, height, width) for _ in range(2))
     expected, known = context.empty((height, width)), context.empty((height, width))
+    kept = context.empty(state.guides.shape)
     before = state.surface
     depths = surface.position is None
     # Surfaces without a position are told apart by depth; what stands in its place is not used.
     places = [s.normal if depths else s.position for s in (surface, before)]
     arguments = (
         width, height, OFF_PLANE, SAME_NORMAL, motion, surface.normal, surface.depth, places[0],
-        before.normal, before.depth, places[1], *TURNED, covered, *state.light, *state.image,
-        *light, *image, expected, known,
+        before.normal, before.depth, places[1], *TURNED, covered, *state.light,
+        state.guides, *state.image, *light, kept, *image, expected, known,
     )  # fmt: skip
-    defines = guide_defines((), 3) | brightness_defines(3) | ({"DEPTHS": 1} if depths else {})
+    defines = guide_defines((state.guides,), 3) | brightness_defines(3)
+    defines |= {"DEPTHS": 1} if depths else {}
     run_on_rows(context, "reproject", "temporal/reproject.cl", defines, arguments)
-    return light, image, expected, known
+    return light, kept, image, expected, known
 
 
 def accumulate(
-    context: Context, before: Average, change: Change, image: Any, covered: Any, least: float
-) -> tuple[Average, Any]:
-    """An average that follows the change, with `image` in it; its samples times `covered`, which
-    says how much a pixel counts, `(H, W)`.
+    context: Context,
+    before: Average,
+    change: Change,
+    image: Any,
+    covered: Any,
+    least: float,
+    kept: Any | None = None,
+    guides: tuple[Any, ...] = (),
+) -> tuple[Average, Any, Any]:
+    """An average that follows the change, with `image` in it; what its pixels weigh in a fit,
+    `(H, W)`; and the average `kept`, `(H, W, Q)`, with `guides`.
 
-    image: `(H, W, 3)`. covered: `(H, W, 1)`. least: share of the image.
+    image: `(H, W, 3)`. covered: `(H, W, 1)`, what they weigh besides. least: share of the image.
     """
     height, width = image.shape[:2]
     average, weight = _new_average(context, height, width), context.empty((height, width))
+    mean = None if kept is None else context.empty(kept.shape)
     lanes = context.width() if height * width >= context.width() else 1
     arguments = (
         height * width, least, change.unit, *before, change.signal, change.noise, image, covered,
-        *average, weight,
+        kept, *guide_arguments(guides), *average, weight, mean,
     )  # fmt: skip
-    defines, size = guide_defines((), 3) | {"WIDTH": lanes}, (-(-height * width // lanes),)
-    context.run("accumulate", "temporal/accumulate.cl", defines, size, arguments)
-    return average, weight
+    defines: dict[str, Any] = {"WIDTH": lanes, "MODEL": f"{MODEL}f"} | guide_defines(guides, 3)
+    size, file = (-(-height * width // lanes),), "temporal/accumulate.cl"
+    context.run("accumulate", file, defines, size, arguments)
+    return average, weight, mean
 
 
 def _new_average(context: Context, height: int, width: int) -> Average:

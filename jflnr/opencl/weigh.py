@@ -31,7 +31,7 @@ def collect_blocks(run: Run, images: Images, block: int) -> tuple[Run, Any, Grid
 
 def _block_moments(run: Run, images: Images, block: int) -> Grid:
     """Unweighted moments on blocks of `block`, and the mean squares of brightness and weight."""
-    target, guides, weight = images
+    target, guides, weight, _ = images
     height, width, channels = target.shape
     lanes = lanes_of(run, block)
     h, w = -(-height // block), -(-width // block)

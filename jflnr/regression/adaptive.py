@@ -17,8 +17,8 @@ from jflnr.frame import Frame
 from jflnr.images.inputs import robust_images, same_size
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression import energy
-from jflnr.regression.apply import apply
-from jflnr.regression.arguments import channel_count, check_options, check_regression
+from jflnr.regression.apply import apply, guides_to_map
+from jflnr.regression.arguments import channel_count, check_options, check_same_size
 from jflnr.regression.floor import with_own_light
 from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides
 from jflnr.regression.moments import (
@@ -162,6 +162,7 @@ def flr_adaptive(
     guides: Guides,
     method: AdaptiveFLR = DEFAULT,
     *,
+    guides_map: Guides | None = None,
     weight: jax.Array | None = None,
     **options: Any,
 ) -> Any:
@@ -172,16 +173,19 @@ def flr_adaptive(
 
     target: `(H, W, C)`, the noisy radiance Y, not negative. guides: `(H, W, Q)`, X without the
     constant, or several such arrays. method: constants and options; options: fields of it to
-    replace. weight: `(H, W)`, numbers or a boolean mask; 0 removes a pixel, as does any value that
-    is not finite.
+    replace. guides_map: `(H, W, Q)`, the guides that the models are evaluated on, such as those of
+    this frame where light and guides are averaged over several; None evaluates on `guides`.
+    weight: `(H, W)`, numbers or a boolean mask; 0 removes a pixel, as does any value that is not
+    finite.
     Returns `(H, W, C)`; `with_error` also `(H, W, 1)`, the standard error of its brightness.
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
     method = dataclasses.replace(method, **options)
-    check_regression(target, guides, None, weight)
+    check_same_size(target, guides, guides_map, weight)
     method = method.ready(channel_count(guides), target.shape[-1])
-    given = regress(method, {"target": target, "guides": guides, "weight": weight})
+    images = {"target": target, "guides": guides, "guides_map": guides_map, "weight": weight}
+    given = regress(method, images)
     return (given["image"], given["error"]) if method.with_error else given["image"]
 
 
@@ -259,7 +263,7 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """Pass 3: the light of every pixel, `(H, W, C)`, and its error."""
     models = energy.scale(parts["models"], parts["output"], known["rate"])
     shift, unit = known["shift"], known["unit"]
-    image = apply(models, parts["guides"], shift, method.finest, method.floor) * unit
+    image = apply(models, guides_to_map(parts), shift, method.finest, method.floor) * unit
     given = {"image": image}
     if method.keep_energy:
         given["sums"] = before_and_after(image, parts, unit)

@@ -44,6 +44,13 @@ def apply(
     return fill(image, 0, height, 1, step_of(block, ROWS), strip)
 
 
+def guides_to_map(parts: dict) -> Guides:
+    """The guides that the models are evaluated on (X_map of section 3.3): those of the fit, unless
+    `guides_map` are others."""
+    others = parts.get("guides_map")
+    return parts["guides"] if others is None else others
+
+
 def apply_strip(
     guides: Guides,
     coefficients: jax.Array,

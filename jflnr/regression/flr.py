@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from jflnr.frame import Frame
 from jflnr.images.inputs import factor_of, plain_images
 from jflnr.lazy import jax, jnp, pytree
-from jflnr.regression.apply import apply
+from jflnr.regression.apply import apply, guides_to_map
 from jflnr.regression.arguments import block_for, check_options, check_regression
 from jflnr.regression.blur import blur
 from jflnr.regression.elimination import Solver
@@ -108,8 +108,8 @@ def fit_models(method: FLR, parts: Parts, known: Known) -> Parts:
 
 def evaluate(method: FLR, parts: Parts, known: Known) -> Parts:
     """Kernel 4."""
-    guides = parts["guides"] if parts["guides_map"] is None else parts["guides_map"]
-    return {"image": apply(parts["models"], guides, known["shift"], method.side)}
+    image = apply(parts["models"], guides_to_map(parts), known["shift"], method.side)
+    return {"image": image}
 
 
 DEFAULT = FLR()

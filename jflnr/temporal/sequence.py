@@ -1,6 +1,7 @@
 """Denoising frame after frame: one step function for all spatial methods (docs/temporal.md).
 
-The noisy light is averaged over time, the spatial method fits the average, and its results are
+The noisy light is averaged over time, and with it the guides, which say of what surfaces it is. The
+spatial method fits one to the other and evaluates the fit at this frame's guides; its results are
 averaged again. What the light has become since is found first and added to both averages.
 """
 
@@ -13,9 +14,10 @@ import jax.numpy as jnp
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
-from jflnr.images.inputs import prepare
+from jflnr.images.inputs import guides_of, prepare
 from jflnr.methods import default_of, method_of
 from jflnr.regression.adaptive import light_of
+from jflnr.regression.arguments import channel_count, layers_of
 from jflnr.stages import compose, regress
 from jflnr.temporal.accumulate import Average, accumulate, less_sure, nothing, reproject
 from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
@@ -23,7 +25,9 @@ from jflnr.temporal.reproject import Surface, find_taps, own_turn
 
 # Variances of one frame that the averaged light and the averaged result, which has less noise, take
 # on by the squared turn of their surface: what falls on it depends on where it faces.
-TURNED = 20.0, 100.0
+TURNED = 2.0, 30.0
+# How wrong a model is, in variances of one frame, however many frames its pixels hold.
+MODEL = 0.5
 
 
 class Temporal(NamedTuple):
@@ -45,22 +49,31 @@ PAST = Temporal()
 class State(NamedTuple):
     """What one frame leaves to the next, a pytree of arrays.
 
-    surface: what it showed. light: its noisy light, averaged over time. image: so is its result.
-    evidence: for a change of the light.
+    surface: what it showed. light: its noisy light, averaged over time. guides: `(H, W, Q)`, so are
+    they, with the same shares. image: and its result. evidence: for a change of the light.
     """
 
     surface: Surface
     light: Average
+    guides: Array
     image: Average
     evidence: Evidence
 
 
-def start(frame: Frame) -> State:
-    """The state before the first frame, of which only the shapes count."""
+def start(frame: Frame, method: Any = None, *, guides: Sequence[str] | None = None) -> State:
+    """The state before the first frame, of which only the shapes count. Arguments as of `step`."""
     checks.image("indirect", frame.indirect)
-    size = frame.indirect.shape
+    height, width, channels = frame.indirect.shape
     surface = jax.tree.map(lambda layer: jnp.zeros(layer.shape), Surface.of(frame))
-    return State(surface, nothing(*size), nothing(*size), no_evidence(*size[:2]))
+    light, image = (nothing(height, width, channels) for _ in range(2))
+    nowhere = jnp.zeros((height, width, guide_count(frame, method, guides)))
+    return State(surface, light, nowhere, image, no_evidence(height, width))
+
+
+def guide_count(frame: Frame, method: Any, guides: Sequence[str] | None) -> int:
+    """Channels of the guides that a method takes of a frame; arguments as of `step`."""
+    method = method_of(default_of(frame) if method is None else method)
+    return channel_count([getattr(frame, name) for name in guides_of(frame, guides, method)])
 
 
 def step(
@@ -84,9 +97,9 @@ def step(
     method, names, inputs = prepared(state, frame, method, guides, options)
     surface = jax.tree.map(jnp.asarray, Surface.of(frame))
     images = inputs, frame.motion, surface
-    light, image, evidence, shown = _step(state, *images, method, temporal, names)
+    light, kept, image, evidence, shown = _step(state, *images, method, temporal, names)
     # The surface and the image twice would be copied if the program returned them.
-    return State(surface, light, image, evidence), image.mean if shown is None else shown
+    return State(surface, light, kept, image, evidence), image.mean if shown is None else shown
 
 
 def prepared(
@@ -111,6 +124,11 @@ def prepared(
             f"the state is of frames of shape {state.light.mean.shape}, and this frame's indirect "
             f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
         )
+    if (count := guide_count(frame, method, guides)) != state.guides.shape[2]:
+        raise ValueError(
+            f"the state is of {state.guides.shape[2]} channels of guides, and method {method.name} "
+            f"takes {count} of this frame: start with the same method and guides"
+        )
     return method.for_frame(inputs, names), names, inputs
 
 
@@ -123,18 +141,19 @@ def _step(
     method: Any,
     temporal: Temporal,
     names: tuple[str, ...],
-) -> tuple[Average, Average, Evidence, jax.Array | None]:
+) -> tuple[Average, jax.Array, Average, Evidence, jax.Array | None]:
     images = method.images(frame, names)
     target, weight = jnp.asarray(images["target"]), images["weight"]
+    channels = target.shape[-1]
     taps = find_taps(motion, surface, state.surface)
-    turn, averages = own_turn(taps, surface, state.surface), (state.light, state.image)
+    turn, averages = own_turn(taps, surface, state.surface), (_with_guides(state), state.image)
     light, image = (
         less_sure(reproject(average, taps), turned * turn)
         for average, turned in zip(averages, TURNED, strict=True)
     )
     known, covered = light.samples[..., 0] > 0, True if weight is None else weight > 0
     change, evidence = find_change(
-        target - light.mean,
+        target - light.mean[..., :channels],
         light_of(image.mean),
         images["guides"],
         jnp.where(known & covered, 1.0, 0.0),
@@ -142,17 +161,29 @@ def _step(
         state.evidence,
         temporal.caution,
     )
-    light = accumulate(_changed(light, change), target, temporal.light)
-    # A pixel counts as much as the frames that it has been seen in.
-    weight = light.samples[..., 0] * (1 if weight is None else weight)
-    images |= {"target": light.mean, "weight": weight}
-    fitted = regress(method, images, composed=False)
+    pixels = jnp.concatenate([target, *layers_of(images["guides"])], axis=-1)
+    light = accumulate(_changed(light, change), pixels, temporal.light)
+    # The more frames a pixel holds the more it counts, until the model is what is wrong.
+    count = light.samples[..., 0]
+    weight = (1 + MODEL) * count / (1 + MODEL * count) * (1 if weight is None else weight)
+    images |= {"target": light.mean[..., :channels], "weight": weight}
+    mapped = {"guides": light.mean[..., channels:], "guides_map": images["guides"]}
+    fitted = regress(method, images | mapped, composed=False)
     image = accumulate(_changed(image, change), fitted["image"], temporal.image)
     shown = compose(method, images | fitted | {"image": image.mean})
-    return light, image, evidence, shown.get("image")
+    light, kept = Average(images["target"], light.samples), mapped["guides"]
+    return light, kept, image, evidence, shown.get("image")
+
+
+def _with_guides(state: State) -> Average:
+    """The averaged light, and behind it the guides."""
+    light, samples = state.light
+    return Average(jnp.concatenate([light, state.guides], axis=-1), samples)
 
 
 def _changed(average: Average, change: Change) -> Average:
     """An average that follows the light."""
     mean, n = average
-    return less_sure(Average(jnp.where(n > 0, mean + change.signal, 0), n), change.noise)
+    # Behind the light there may be guides, which stay.
+    signal = jnp.pad(change.signal, [(0, 0), (0, 0), (0, mean.shape[2] - change.signal.shape[2])])
+    return less_sure(Average(jnp.where(n > 0, mean + signal, 0), n), change.noise)

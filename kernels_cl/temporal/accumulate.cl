@@ -1,5 +1,5 @@
-// An average that follows the light, with one more frame in it: host side in jflnr/opencl/temporal.py,
-// twin in jflnr/temporal/accumulate.py.
+// An average that follows the light, with one more frame in it, and one of guides beside it: host side
+// in jflnr/opencl/temporal.py, twins in jflnr/temporal/accumulate.py and sequence.py.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -8,13 +8,15 @@
 #define OWN(image, c) target_lanes((image) + pixel * 3, 3, c, 0, WIDTH - 1)
 
 // Global size (ceil(pixels / WIDTH)); pixels is at least WIDTH. before, signal, image, mean: (pixels, 3).
-// before_samples, noise, surface, samples: (pixels). signal: in units. least: of a new frame. weight:
-// (pixels), the samples times surface, where that is above 0, else 0.
+// All else (pixels), but for before_guides and mean_guides, (pixels, Q). signal: in units. least: of a
+// new frame. weight: what a pixel weighs in a fit, by its samples and surface, 0 where that is not
+// above 0. Define: MODEL, how wrong a model is, in variances of one frame.
 kernel void accumulate(
     int pixels, float least, global const float *unit, global const float *before,
     global const float *before_samples, global const float *signal, global const float *noise,
-    global const float *image, global const float *surface, global float *mean,
-    global float *samples, global float *weight)
+    global const float *image, global const float *surface, global const float *before_guides,
+    GUIDE_PARAMETERS, global float *mean, global float *samples, global float *weight,
+    global float *mean_guides)
 {
     if ((long)get_global_id(0) * WIDTH >= pixels) return;
     const long pixel = MIN((long)get_global_id(0) * WIDTH, (long)pixels - WIDTH);
@@ -24,7 +26,21 @@ kernel void accumulate(
     real own[3], mixed[3];
 #pragma unroll
     for (int c = 0; c < 3; ++c) own[c] = OWN(image, c);
-    const mask good = 0 * own[0] + 0 * own[1] + 0 * own[2] == 0;
+    mask good = 0 * own[0] + 0 * own[1] + 0 * own[2] == 0;
+#if Q > 0
+    real guide[Q], mixed_guide[Q];
+#pragma unroll
+    for (int q = 0; q < Q; ++q) {
+        guide[q] = read_guide(GUIDE_IMAGES, q, pixel, 0, WIDTH - 1);
+        good &= 0 * guide[q] == 0;
+    }
+#pragma unroll
+    for (int q = 0; q < Q; ++q) {
+        const real kept = target_lanes(before_guides + pixel * Q, Q, q, 0, WIDTH - 1);
+        mixed_guide[q] = kept + (good ? share * (guide[q] - kept) : (real)0);
+    }
+    write_guides(mean_guides + pixel * Q, mixed_guide);
+#endif
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
         const real kept = OWN(before, c) + unit[0] * OWN(signal, c);
@@ -37,5 +53,6 @@ kernel void accumulate(
     write_pixels(mean + pixel * 3, mixed, 0, WIDTH - 1);
     WRITE(count, samples + pixel);
     const real counts = READ(surface + pixel);
-    WRITE(counts > 0 ? count * counts : (real)0, weight + pixel);
+    const real weighs = counts * (1 + MODEL) * count / (1 + MODEL * count);
+    WRITE(counts > 0 ? weighs : (real)0, weight + pixel);
 }

@@ -45,16 +45,17 @@ INLINE real own_turn(const Taps *taps, long pixel, int width, SURFACE_PARAMETERS
     return 0 * turn == 0 ? turn : (real)0;
 }
 
-// Global size (W / WIDTH, H). Means, normals and positions (H, W, 3), motion (H, W, 2), all others
-// (H, W). surface: above 0 where samples count. expected: brightness of the image there. known: 1
-// where samples count and there is a history, else 0. turned, image_turned: noise
-// that the averages take on by the square of a turn.
+// Global size (W / WIDTH, H). Guides (H, W, Q), averaged with the light; means, normals and positions
+// (H, W, 3), motion (H, W, 2), all others (H, W). surface: above 0 where samples count. expected:
+// brightness of the image there. known: 1 where samples count and there is a history, else 0. turned,
+// image_turned: noise that the averages take on by the square of a turn.
 kernel void reproject(
     int width, int height, SURFACE_PARAMETERS, float turned, float image_turned,
     global const float *surface, global const float *light, global const float *light_samples,
-    global const float *image, global const float *image_samples, global float *moved_light,
-    global float *moved_light_samples, global float *moved_image,
-    global float *moved_image_samples, global float *expected, global float *known)
+    global const float *guides, global const float *image, global const float *image_samples,
+    global float *moved_light, global float *moved_light_samples, global float *moved_guides,
+    global float *moved_image, global float *moved_image_samples, global float *expected,
+    global float *known)
 {
     const int x = FIRST_PIXEL(width), y = get_global_id(1);
     if ((int)get_global_id(0) * WIDTH >= width || y >= height) return;
@@ -69,6 +70,12 @@ kernel void reproject(
     move(
         image, image_samples, &taps, image_turned * turn, pixel, moved_image, moved_image_samples,
         found);
+#if Q > 0
+    real mean[Q];
+#pragma unroll
+    for (int q = 0; q < Q; ++q) mean[q] = gather(guides, Q, q, &taps);
+    write_guides(moved_guides + pixel * Q, mean);
+#endif
 #pragma unroll
     for (int c = 0; c < 3; ++c) brightness += BRIGHTNESS(c) * found[c];
     WRITE(brightness, expected + pixel);

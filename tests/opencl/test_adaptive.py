@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from jflnr.images.noisy_guides import smooth_guide as jax_smooth
-from jflnr.opencl import Context, flr_adaptive, smooth_guide
+from jflnr.network.flnr import FLNR
+from jflnr.opencl import Context, flnr, flr_adaptive, smooth_guide
 from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.adaptive import flr_adaptive as jax_adaptive
 from tests.opencl import tolerances
@@ -55,6 +56,19 @@ def test_weights_and_spoiled_pixels(context: Context, kind: str) -> None:
     target[30, 31], target[31, 150, 1], guides[32, 33, 1] = np.nan, np.inf, np.nan
     weight = weight > 0 if kind == "mask" else weight
     assert compare(context, target, guides, weight) < tolerances.ADAPTIVE
+
+
+@pytest.mark.parametrize(
+    ("method", "run", "bound"),
+    [(PARAMETERS, flr_adaptive, tolerances.ADAPTIVE), (FLNR(size="small"), flnr, tolerances.WHOLE)],
+)
+def test_evaluated_on_other_guides(
+    context: Context, method: Any, run: Callable[..., np.ndarray], bound: float
+) -> None:
+    target, guides = scene(*SIZE, 5, 3)
+    mapped = np.ascontiguousarray(guides[::-1])
+    found = run(target, guides, method, guides_map=mapped, context=context)
+    assert error(found, np.asarray(jax_adaptive(target, guides, method, guides_map=mapped))) < bound
 
 
 def test_exponent_of_one(context: Context) -> None:

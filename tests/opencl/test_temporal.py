@@ -44,14 +44,17 @@ def frames() -> list[jflnr.Frame]:
 
 def compare(context: Context, frames: list[jflnr.Frame]) -> None:
     """`flr` by both over the same frames, each with its own history."""
-    ours, right = kernels.start(frames[0], context), temporal.start(frames[0])
+    ours = kernels.start(frames[0], "flr", guides=GUIDES, context=context)
+    right = temporal.start(frames[0], "flr", guides=GUIDES)
     height, width = (-(-size // BLOCK) for size in frames[0].indirect.shape[:2])
     for frame in frames:
         ours, found = kernels.step(ours, frame, "flr", guides=GUIDES, context=context)
         right, image = temporal.step(right, frame, "flr", guides=GUIDES)
         assert error(found, np.asarray(image)) < tolerances.ADAPTIVE
         for one, other in zip(
-            (*ours.light, *ours.image), (*right.light, *right.image), strict=True
+            (*ours.light, ours.guides, *ours.image),
+            (*right.light, right.guides, *right.image),
+            strict=True,
         ):
             assert error(one.get(), np.asarray(other)) < tolerances.ADAPTIVE
         evidence = ours.evidence.get().transpose(2, 0, 1, 3).reshape(2, height, -1)[..., :width]
@@ -69,7 +72,7 @@ def test_the_first_frame_is_denoised_as_by_itself(
     frame = jflnr.read_frame(SHIPPED_FRAME)
     frame = jax.tree.map(lambda layer: layer[90:154, 150:246], frame)
     frame = dataclasses.replace(frame, motion=np.zeros((64, 96, 2), np.float32))
-    found = kernels.step(kernels.start(frame, context), frame, method, context=context)[1]
+    found = kernels.step(kernels.start(frame, context=context), frame, method, context=context)[1]
     filters = filters_on(context)
     images = robust_images(*prepare(frame, None, method_of(method))[::-1], filters=filters)
     right = alone(
@@ -92,7 +95,8 @@ def test_driven_as_a_gpu(gpu_like: Context, frames: list[jflnr.Frame]) -> None:
 
 
 def test_a_result_on_the_device_is_the_history(context: Context, frames: list[jflnr.Frame]) -> None:
-    first = kernels.start(frames[0], context), frames[0], "flr"
+    start = kernels.start(frames[0], "flr", guides=GUIDES, context=context)
+    first = start, frames[0], "flr"
     state, image = kernels.step(*first, guides=GUIDES, context=context, on_device=True)
     again = kernels.step(*first, guides=GUIDES, context=context)[1]
     np.testing.assert_array_equal(image.get(), again)
@@ -100,6 +104,6 @@ def test_a_result_on_the_device_is_the_history(context: Context, frames: list[jf
 
 
 def test_frames_of_another_size_are_refused(context: Context, frames: list[jflnr.Frame]) -> None:
-    state = kernels.start(frames[0], context)
+    state = kernels.start(frames[0], "flr", guides=GUIDES, context=context)
     with pytest.raises(ValueError, match="another size"):
         kernels.step(state, shot(1, 20, 20)[0], "flr", guides=GUIDES, context=context)

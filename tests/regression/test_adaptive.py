@@ -38,8 +38,11 @@ def denoised(scene):
     return flr_adaptive(y, x, AdaptiveFLR(), levels=2)
 
 
-def test_without_adapting_it_is_flr(scene):
+@pytest.mark.parametrize("moved", [False, True])
+def test_without_adapting_it_is_flr(scene, moved):
+    """Also evaluated on other guides than those of the fit."""
     x, y = scene
+    mapped = {"guides_map": x[::-1]} if moved else {}
     off = AdaptiveFLR(
         sigma=2.0,
         noise_ridge=1e-30,
@@ -48,8 +51,8 @@ def test_without_adapting_it_is_flr(scene):
         guide_scale=1e-20,
         slack=1e9,
     )
-    ours = flr_adaptive(y, x, off, block=16, levels=1)
-    plain = flr(y, x, FLR(16.0, 1e-4, 1e-4), block=8, support=40)
+    ours = flr_adaptive(y, x, off, block=16, levels=1, **mapped)
+    plain = flr(y, x, FLR(16.0, 1e-4, 1e-4), block=8, support=40, **mapped)
     np.testing.assert_allclose(ours, plain, atol=1e-4)
 
 
@@ -147,6 +150,8 @@ def test_wrong_arguments_are_named(scene):
         uncompiled(y, x, AdaptiveFLR(), levels=0)
     with pytest.raises(ValueError, match="guides"):
         uncompiled(y, x[:4], AdaptiveFLR())
+    with pytest.raises(ValueError, match="needs guides_map at the size of target"):
+        uncompiled(y, x, AdaptiveFLR(), guides_map=jnp.concatenate([x, x]).repeat(2, 1))
     with pytest.raises(ValueError, match="caution"):
         AdaptiveFLR(caution=-1)
 

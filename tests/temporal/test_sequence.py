@@ -12,6 +12,7 @@ import jflnr
 from jflnr import temporal
 from jflnr.denoising import SHIPPED_FRAME
 from jflnr.frame import Frame
+from jflnr.regression.flr import FLR
 from jflnr.temporal import sequence
 
 HEIGHT, WIDTH = 48, 80
@@ -35,7 +36,7 @@ def view(left: int, moved: int, light: float = 1.0) -> Frame:
 
 
 def run(frames: list[Frame], method: str = "flr-adaptive") -> list[np.ndarray]:
-    state, images = temporal.start(frames[0]), []
+    state, images = temporal.start(frames[0], method), []
     for frame in frames:
         state, image = temporal.step(state, frame, method)
         images.append(np.asarray(image))
@@ -55,7 +56,7 @@ def pan() -> tuple[list[Frame], list[np.ndarray]]:
 
 def test_the_first_frame_is_denoised_as_by_itself(pan: tuple) -> None:
     frames, images = pan
-    alone = temporal.step(temporal.start(frames[5]), frames[5], "flr-adaptive")[1]
+    alone = temporal.step(temporal.start(frames[5], "flr-adaptive"), frames[5], "flr-adaptive")[1]
     again = jflnr.denoise(frames[5], "flr-adaptive")
     np.testing.assert_allclose(alone, again, rtol=1e-4, atol=1e-5)
     assert 0.5 < error(frames[5], np.asarray(alone)) / error(frames[0], images[0]) < 2
@@ -126,6 +127,18 @@ def test_a_surface_that_turns_is_lit_as_it_faces_now() -> None:
     assert errors[1] < 1.5 * errors[0]
 
 
+def test_light_that_follows_the_normals_is_exact_however_these_turn() -> None:
+    """The averaged light is that of the averaged guides, so the fit is as exact as in one frame."""
+    frames = [rolling(i) for i in range(4)]
+    frames = [dataclasses.replace(f, indirect=1 + 0.5 * f.normal[..., 1:2]) for f in frames]
+    state, method = temporal.start(frames[0], "flr"), FLR(sigma=3.0, eps_prime=1e-6)
+    fits = temporal.Temporal(image=1.0, caution=1e9)  # not averaged, nor is light said to change
+    for frame in frames:
+        state, image = temporal.step(state, frame, method, temporal=fits)
+    assert np.abs(state.guides[..., :3] - frames[-1].normal)[20:28, 30:50].max() > 0.1
+    np.testing.assert_allclose(image, frames[-1].indirect, atol=2e-3)
+
+
 def test_the_unit_of_light_does_not_matter() -> None:
     frames = [view(0, 0) for _ in range(3)]
     bright = [dataclasses.replace(frame, indirect=1024 * frame.indirect) for frame in frames]
@@ -178,5 +191,7 @@ def test_errors() -> None:
         temporal.step(state, frame, "svgf")
     with pytest.raises(TypeError, match="flr has no levels"):
         temporal.step(state, frame, levels=3)
+    with pytest.raises(ValueError, match="5 channels of guides, and method flr takes 3"):
+        temporal.step(state, frame, guides=("normal",))
     with pytest.raises(ValueError, match="another size"):
         temporal.step(state, jax.tree.map(lambda layer: layer[:40], frame))
