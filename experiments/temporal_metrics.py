@@ -1,4 +1,4 @@
-"""How a denoised sequence behaves in time: flicker, lag after a change of light, recovery.
+"""How a denoised sequence behaves in time: flicker, lag after a change of light, parts of it.
 
 Flicker is taken, as all picture metrics are (`jflnr.metrics`), on displayed pictures; one exposure
 serves the whole sequence, or its changes would count. Time is in frames.
@@ -57,10 +57,8 @@ def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[d
 def _measure(frame: Frame, light: Array, scale: float) -> dict[str, float | None]:
     shown, true = (_displayed(frame, image, scale) for image in (light, frame.reference))
     error = None
-    if frame.reference_a is not None and frame.reference is not None:
-        half_b = 2 * np.asarray(frame.reference, np.float64) - frame.reference_a
-        halves = (_displayed(frame, half, scale) for half in (frame.reference_a, half_b))
-        error = unbiased_mse(shown, *halves)
+    if frame.reference_a is not None:
+        error = unbiased_mse(shown, *(_displayed(frame, half, scale) for half in _halves(frame)))
     return {
         "psnr": psnr(shown, true),
         "psnr_unbiased": None if error is None or error <= 0 else float(-10 * np.log10(error)),
@@ -100,13 +98,9 @@ def false_change(
     So what flickers counts, and what should change and does not. The half references leave out
     their noise, hence it may be below 0; None without them.
     """
-    halves_a, halves_b = [], []
-    for frame in frames:
-        if frame.reference_a is None or frame.reference is None:
-            return None
-        halves_a.append(np.asarray(frame.reference_a, np.float32))
-        halves_b.append(2 * np.asarray(frame.reference, np.float32) - halves_a[-1])
-    pairs = lights, (halves_a[0], halves_a[1]), (halves_b[0], halves_b[1])
+    if any(frame.reference_a is None for frame in frames):
+        return None
+    pairs = lights, *zip(*(_halves(frame) for frame in frames), strict=True)
     change, true_a, true_b = (_warped_change(frames, pair, scale) for pair in pairs)
     return float(np.mean((change - true_a) * (change - true_b))) if change.size else None
 
@@ -177,39 +171,49 @@ def ages(frames: Sequence[Frame]) -> np.ndarray:
     return np.stack(found)
 
 
-def recovery(frames: Sequence[Frame], lights: Sequence[Array]) -> dict[str, float | None]:
-    """PSNR of displayed pixels by how long ago they came into view (`AGES`); None without any.
+def by_region(
+    frames: Sequence[Frame], lights: Sequence[Array], still_camera: bool
+) -> dict[str, float | None]:
+    """PSNR of displayed pixels in parts of the picture, less the noise of the references where
+    there are halves of them; None for a part without pixels, or without any error.
 
-    Pixels outside the mask and those in view since the first frame are left out.
+    `moving`: what moves across the picture, if the camera stands still. All else by how long ago it
+    came into view (`AGES`), or `always` in view. Pixels outside the mask are left out.
     """
     error, age = _squared_errors(frames, lights), ages(frames)
-    return {name: _psnr(error[(age >= low) & (age < high)]) for name, (low, high) in AGES.items()}
-
-
-def moving(frames: Sequence[Frame], lights: Sequence[Array]) -> float | None:
-    """PSNR of the displayed pixels that move across the picture; None without any.
-
-    Under a still camera those of an object. Pixels outside the mask are left out.
-    """
     speed = np.stack([np.abs(np.asarray(frame.motion)).max(axis=-1) for frame in frames])
-    return _psnr(_squared_errors(frames, lights)[speed > STILL])
+    moves = (speed > STILL) & still_camera
+    parts = {"moving": moves}
+    parts |= {name: (age >= low) & (age < high) & ~moves for name, (low, high) in AGES.items()}
+    parts["always"] = np.isinf(age) & ~moves
+    return {name: _psnr(error[part]) for name, part in parts.items()}
 
 
 def _squared_errors(frames: Sequence[Frame], lights: Sequence[Array]) -> np.ndarray:
-    """Of displayed pixels, `(T, H, W)`; NaN outside the mask."""
+    """Of displayed pixels, `(T, H, W)`; NaN outside the mask. With half references their product,
+    whose mean leaves out the references' noise."""
     scale, errors = sequence_exposure(frames), []
     for frame, light in zip(frames, lights, strict=True):
-        shown = [_displayed(frame, image, scale) for image in (light, frame.reference)]
-        error = np.mean((shown[0] - shown[1]) ** 2, axis=-1)
+        true = [_displayed(frame, half, scale) for half in _halves(frame)]
+        shown = _displayed(frame, light, scale)
+        error = np.mean((shown - true[0]) * (shown - true[-1]), axis=-1)
         inside = True if frame.mask is None else np.asarray(frame.mask)[..., 0] > 0
         errors.append(np.where(inside, error, np.nan))
     return np.stack(errors)
 
 
+def _halves(frame: Frame) -> list[np.ndarray]:
+    """Both halves of the reference, or the reference itself."""
+    if frame.reference_a is None:
+        return [np.asarray(frame.reference, np.float64)]
+    half = np.asarray(frame.reference_a, np.float64)
+    return [half, 2 * np.asarray(frame.reference, np.float64) - half]
+
+
 def _psnr(errors: np.ndarray) -> float | None:
     """Of squared errors that are known; None without any."""
-    known = errors[np.isfinite(errors)]
-    return float(-10 * np.log10(known.mean())) if known.size else None
+    mean = np.mean(errors, where=np.isfinite(errors)) if np.isfinite(errors).any() else 0
+    return float(-10 * np.log10(mean)) if mean > 0 else None
 
 
 def _reflected(frame: Frame, light: Array | None) -> np.ndarray:

@@ -126,7 +126,7 @@ def test_response_to_a_switch() -> None:
         temporal_metrics.response(lights, before, before)
 
 
-def test_ages_and_recovery() -> None:
+def test_ages_and_what_has_come_into_view() -> None:
     frames = shot([0, 0, 4, 0, 0])
     ages = temporal_metrics.ages(frames)
     assert np.isinf(ages[:, :, :-4]).all() and np.isinf(ages[:2]).all()
@@ -134,8 +134,9 @@ def test_ages_and_recovery() -> None:
     lights = [frame.reference.copy() for frame in frames]
     lights[2][:, -4:] *= 1.5
     lights[3][:, -4:] *= 1.1
-    found = temporal_metrics.recovery(frames, lights)
+    found = temporal_metrics.by_region(frames, lights, still_camera=False)
     assert found["0"] < found["1 to 3"] and found["4 to 7"] is None
+    assert found["moving"] is found["always"] is None
 
 
 def test_what_moves_is_measured_alone() -> None:
@@ -145,8 +146,24 @@ def test_what_moves_is_measured_alone() -> None:
     lights = [(1.2 if i == 2 else 3.0) * frame.reference for i, frame in enumerate(frames)]
     shown, true = (display(frames[2].albedo * x, scale) for x in (lights[2], frames[2].reference))
     wanted = -10 * np.log10(np.mean((shown - true) ** 2))
-    assert temporal_metrics.moving(frames, lights) == pytest.approx(wanted, abs=1e-3)
-    assert temporal_metrics.moving(frames[:2], lights[:2]) is None
+    found = temporal_metrics.by_region(frames, lights, still_camera=True)
+    assert found["moving"] == pytest.approx(wanted, abs=1e-3) and found["0"] is None
+    assert temporal_metrics.by_region(frames[:2], lights[:2], True)["moving"] is None
+
+
+def test_noise_of_the_references_does_not_count() -> None:
+    frames, rng = shot([0, 0]), np.random.default_rng(0)
+    lights = [1.05 * frame.reference for frame in frames]
+    exact = temporal_metrics.by_region(frames, lights, True)["always"]
+    noise = [0.2 * rng.standard_normal((2, *light.shape)) for light in lights]
+    noisy = [
+        dataclasses.replace(f, reference=f.reference + n.mean(0), reference_a=f.reference + n[0])
+        for f, n in zip(frames, noise, strict=True)
+    ]
+    found = temporal_metrics.by_region(noisy, lights, True)["always"]
+    assert found == pytest.approx(exact, abs=1.5)
+    biased = [dataclasses.replace(frame, reference_a=None) for frame in noisy]
+    assert temporal_metrics.by_region(biased, lights, True)["always"] < exact - 5
 
 
 def test_wrong_sequences_are_refused() -> None:
