@@ -108,8 +108,6 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
         _check_there(path)
         return pfm.read(path)
     with _opened(path) as (announced, read):
-        for part in announced:
-            _check_header(path, part)
         parts = read()
         if len(parts) != len(announced):
             raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
@@ -282,6 +280,8 @@ def _opened(path: Path) -> Iterator[tuple[list[_Part], Callable[[], list[_Part]]
                         raise
                     place = Path(folder) / "copy.exr"
                     place.write_bytes(data)
+            for part in parts:
+                _check_header(path, part)
             yield parts, functools.partial(read, header_only=False)
         except Exception as error:  # RuntimeError, TypeError, MemoryError, ...
             if str(error).startswith(str(path)):

@@ -35,6 +35,9 @@ def _openimageio() -> Any:
             "the frame is larger than the memory it may take, and reading it in parts needs "
             "OpenImageIO: pip install 'jflnr[large]', or raise --memory"
         ) from None
+    # What a file may announce is bounded where its header is read, for either reader.
+    for limit in ("imagesize_MB", "resolution", "channels"):
+        OpenImageIO.attribute(f"limits:{limit}", 0)
     return OpenImageIO
 
 

@@ -48,6 +48,18 @@ def test_rows_far_into_another_data_window(tmp_path, rng):
     assert part.attributes.window.origin == (-3, 28)
 
 
+@pytest.mark.parametrize("limit", ["imagesize_MB", "resolution", "channels"])
+def test_a_sound_file_is_read_whatever_its_size(tmp_path, rng, limit):
+    """Also where OpenImageIO would refuse it: what is sound is decided in one place."""
+    import OpenImageIO
+
+    image = {c: rng.random((500, 600), np.float32) for c in ("depth.Z", "R", "G", "B")}
+    exr.write_channels(tmp_path / "a.exr", image)
+    OpenImageIO.attribute(f"limits:{limit}", 1)
+    part = Scanlines(tmp_path / "a.exr", 1, {}).part(490, 494, {"depth"})
+    np.testing.assert_array_equal(part.channels["depth.Z"], image["depth.Z"][490:494])
+
+
 def test_a_file_in_strips_is_the_file_denoised(frame_file, tmp_path):
     whole, ours = tmp_path / "whole.exr", tmp_path / "strips.exr"
     assert main(["denoise", str(frame_file), "-o", str(whole)]) == 0
