@@ -16,6 +16,7 @@ what the ones before it left.
 
 import argparse
 import dataclasses
+import errno
 import math
 import os
 import time
@@ -45,6 +46,8 @@ EXAMPLES = """\
   jflnr denoise room.exr -o out/ --reference    metrics before and after
   jflnr denoise --hdr color.pfm --alb albedo.pfm --nrm normal.pfm -o out.pfm    as OIDN's command
 """
+
+WITHOUT_WAITING = getattr(os, "O_NONBLOCK", 0)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -149,7 +152,7 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
     records, told, start = [], Counter[str](), time.perf_counter()
     with (
         voices() as (out, err),
-        open(arguments.log or os.devnull, "ab", buffering=0) as log,
+        open(arguments.log or os.devnull, "ab", buffering=0, opener=_at_once) as log,
         tqdm(
             total=len(jobs), unit="frame", disable=arguments.quiet or None, leave=False, file=err
         ) as bar,
@@ -165,7 +168,8 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
             except OSError as error:
                 raise OSError(f"{arguments.log} cannot be written: {error.strerror}") from None
 
-        loud, results = None if arguments.quiet else err, None if arguments.json or piped else out
+        loud = None if arguments.quiet else err
+        results = None if arguments.json else loud if piped else out
         for record in _records(worker, jobs, arguments):
             records.append(record)
             bar.update()
@@ -185,6 +189,19 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
         print(named(to_json(sorted(records, key=lambda record: places[record["input"]]))))
     good = sum("error" not in record for record in records)
     return 0 if good == len(records) else SOME_FAILED if good else 2
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Open without waiting for who reads a pipe."""
+    try:
+        handle = os.open(path, flags | WITHOUT_WAITING, 0o666)
+    except OSError as error:
+        if error.errno != errno.ENXIO:
+            raise
+        raise OSError(f"{path} cannot be written: nobody reads this pipe") from None
+    if WITHOUT_WAITING:
+        os.set_blocking(handle, True)
+    return handle
 
 
 def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:

@@ -43,6 +43,8 @@ def as_files(
         raise ValueError("- stands for one frame, without others")
     if output == STREAM and (arguments.json or arguments.png or arguments.explain):
         raise ValueError("-o - writes one picture to standard output, without --json or --png")
+    if output == STREAM and sys.__stdout__ is None:
+        raise ValueError("-o - writes to standard output, which is closed")
     with removed(folder := Path(tempfile.mkdtemp())):
         words: dict[Path, str] = {}
         if inputs == [STREAM]:
@@ -58,8 +60,13 @@ def as_files(
             lambda text: functools.reduce(lambda t, at: t.replace(str(at), words[at]), words, text),
         )
         if output == STREAM and target.exists():
-            with open(1, "wb", closefd=False) as stdout:
-                stdout.write(target.read_bytes())
+            try:
+                with open(1, "wb", closefd=False) as stdout:
+                    stdout.write(target.read_bytes())
+            except BrokenPipeError:  # who reads it has enough
+                raise
+            except OSError as error:
+                raise OSError(f"standard output cannot be written: {error.strerror}") from None
 
 
 def _received(folder: Path) -> Path:

@@ -26,9 +26,15 @@ TRIM_THRESHOLD, KEPT = -1, 2**29
 def parse(text: str) -> int:
     """`4G` in bytes; the units are K, M, G and T, of 1024. Raises ValueError."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)
-    if not found or float(found[1]) == 0:
-        raise ValueError(f"--memory must be a size such as 4G or 800M; got {text!r}")
-    return int(float(found[1]) * UNITS[found[2].upper()])
+    if found and (size := int(float(found[1]) * UNITS[found[2].upper()])):
+        return size
+    raise ValueError(f"--memory must be a size such as 4G or 800M; got {text!r}")
+
+
+def shown(size: float) -> str:
+    """Bytes as `parse` reads them, in the largest unit that they fill."""
+    unit = next(unit for unit in reversed(UNITS) if size >= UNITS[unit])
+    return f"{size / UNITS[unit]:.4g}{unit}"
 
 
 def free() -> int:
@@ -69,7 +75,7 @@ def tile_for(height: int, width: int, memory: int, at_once: int, method: Any) ->
     if side < SMALLEST:
         least = fixed + PIECE[kind] * (SMALLEST + overlap) ** 2
         raise ValueError(
-            f"--memory: {memory / 2**20:.0f}M are too little for {width} x {height} pixels with "
-            f"{method.name}; about {least / 2**20:.0f}M are needed"
+            f"--memory: {shown(memory)} is too little for {width} x {height} pixels with "
+            f"{method.name}; about {shown(least)} is needed"
         )
     return int(side) // 32 * 32

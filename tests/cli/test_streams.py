@@ -145,6 +145,36 @@ def test_a_log_that_cannot_be_written_is_named(
     )
 
 
+def test_what_becomes_of_a_picture_on_standard_output(frame_file: Path) -> None:
+    """It is there, or it is said why not; what else is said goes to the other stream."""
+    line = f"{JFLNR} denoise frame.exr -o -"
+    for end, code, words in (
+        ("--reference > out.exr", 0, b"PSNR"),
+        ("-q > out.exr", 0, b""),
+        (">&-", 2, b"jflnr: -o - writes to standard output, which is closed\n"),
+        ("-q > /dev/full", 2, b"jflnr: standard output cannot be written: No space left on device"),
+    ):
+        done = shell(f"{line} {end}", frame_file.parent)
+        assert done.returncode == code and words in done.stderr and not done.stdout
+        assert done.stderr.count(b"\n") == 1 or code == 0
+        if code == 0:
+            assert "indirect.R" in exr.read_channels(frame_file.with_name("out.exr"))
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_a_log_may_be_a_pipe_that_somebody_reads(frame_file: Path, read: bool) -> None:
+    os.mkfifo(frame_file.with_name("pipe"))
+    reader = "cat pipe > log & " if read else ""
+    done = shell(
+        f"{reader}{JFLNR} {DENOISE} --log pipe; code=$?; wait; exit $code", frame_file.parent
+    )
+    assert done.returncode == (0 if read else 2)
+    if read:
+        assert b"out.exr" in frame_file.with_name("log").read_bytes()
+    else:
+        assert done.stderr == b"jflnr: pipe cannot be written: nobody reads this pipe\n"
+
+
 # Not UTF-8, what a terminal obeys, what HTML and JSON quote, what a line ends with.
 NAMES = [b"caf\xe9", b"red\x1b[31m", b"\"'<b>&amp;", b"a\nb", b"two  spaces"]
 

@@ -131,7 +131,7 @@ def test_sizes_are_read(text, size):
     assert memory.parse(text) == size
 
 
-@pytest.mark.parametrize("text", ["", "0G", "-1G", "4X", "lots"])
+@pytest.mark.parametrize("text", ["", "0G", "0.5", "-1G", "4X", "lots"])
 def test_what_is_no_size_is_named(text):
     with pytest.raises(ValueError, match="--memory must be a size such as 4G"):
         memory.parse(text)
@@ -145,8 +145,12 @@ def test_larger_frames_come_in_smaller_pieces(method, gigabytes):
     large = tile_for(8192, 16384, gigabytes * gigabyte)
     larger = tile_for(16384, 32768, gigabytes * gigabyte)
     assert large > larger > 0
-    with pytest.raises(ValueError, match="too little for 16384 x 8192 pixels"):
+    with pytest.raises(
+        ValueError, match=r"512M is too little for 16384 x 8192 pixels .*\dG is nee"
+    ):
         tile_for(8192, 16384, gigabyte // 2)
+    with pytest.raises(ValueError, match="100K is too little"):
+        tile_for(8192, 16384, 100 << 10)
 
 
 def test_more_frames_at_once_leave_less_for_each():
