@@ -91,14 +91,20 @@ kernel void steer(
         write_lanes(steer + to * size + pixel, width, x0, counts > 0 ? sum * over : (real)0);
 }
 
-// The inverse of `spread`.
+// The inverse of `spread`, of `averages`, or of `planes` where no more than `nothing` was averaged.
+// number: (H, W).
 kernel void gather(
-    int width, int height, int first, global const float *planes, global float *image)
+    int width, int height, int first, float nothing, global const float *number,
+    global const float *averages, global const float *planes, global float *image)
 {
     PLACE;
+    const real counts = lanes_at(number + line, width, x0);
     real values[C];
 #pragma unroll
-    for (int c = 0; c < C; ++c)
-        values[c] = lanes_at(planes + (first + c) * size + line, width, x0);
+    for (int c = 0; c < C; ++c) {
+        const long at = (first + c) * size + line;
+        const real average = lanes_at(averages + at, width, x0);
+        values[c] = counts > nothing ? average : lanes_at(planes + at, width, x0);
+    }
     write_pixels(image + pixel * C, values, 0, MIN(width - x0, WIDTH) - 1);
 }

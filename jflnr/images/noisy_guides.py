@@ -73,4 +73,5 @@ def antialiased(normal: Any) -> Any:
 def holds_light(albedo: Any, own: Any) -> Any:
     """Whether an albedo has emission and environment added to it, `()`. own: these, `(H, W, 3)`."""
     xp: Any = albedo.__array_namespace__()
-    return xp.all(~(albedo < (1 - ROUNDING) * own - ROUNDING))
+    least = (1 - ROUNDING) * own - ROUNDING
+    return ~xp.any((albedo < least) & xp.isfinite(albedo) & xp.isfinite(least))

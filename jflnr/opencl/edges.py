@@ -7,7 +7,7 @@ import numpy as np
 from jflnr.opencl.arguments import to_device
 from jflnr.opencl.context import Context
 from jflnr.opencl.moments import guide_defines
-from jflnr.regression.features import NEAR, REACH, WIDTH, alike_of
+from jflnr.regression.features import NEAR, NOTHING, REACH, WIDTH, alike_of
 from jflnr.regression.picture import steer_of
 
 
@@ -44,11 +44,11 @@ def filter_layers(
         run("steer", name, places[name], *numbers, follow, peak if covers else one, usable, steer)
         to += count
     alike = np.broadcast_to(alike_of(np.asarray(samples)), (height, width))
-    _, averages = average(context, steer, follow, usable, alike)
+    number, averages = average(context, steer, follow, usable, alike)
     results = [np.empty(image.shape, np.float32) for image in images]
     outputs = [context.to_fill(result) for result in results]
     for name, output in zip(layers, outputs, strict=True):
-        run("gather", name, places[name], averages, output)
+        run("gather", name, places[name], NOTHING, number, averages, follow, output)
     found = zip(outputs, results, strict=True)
     return tuple(context.finish(output, result) for output, result in found)
 

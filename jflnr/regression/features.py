@@ -25,6 +25,8 @@ REACH, WIDTH = 3, 2.0
 # 1: the variance with one sample per pixel, which falls with their number, and with all of them.
 # Blurred they may differ by so many times that.
 VARIANCE, LEAST, NEAR = 0.085, 0.0025, 2.5
+# Pixels of equal weight that are as good as none.
+NOTHING = 2e-12
 # Of a picture that does not say how many it is made of.
 SAMPLES = 4
 # How many pixels away a filtered one looks: over its window and that of `coverage`, and seven
@@ -116,7 +118,8 @@ def filter_features(
 
     steering: what tells the edges, `(H, W, C)` each, so scaled that it varies by about 1.
     following: what is averaged, `(H, W, C)` each, in any unit. A pixel with a value that is not
-    finite in either is left out of the averages, and gets that of its neighbours.
+    finite in either is left out of the averages, and gets that of its neighbours, if one counts;
+    else it stays as it is.
     samples: per pixel, that either is made of, or `(H, W, 1)`.
     Returns the features of `following`.
     """
@@ -126,8 +129,8 @@ def filter_features(
     )
     usable = jnp.all(jnp.isfinite(steer), axis=0) & jnp.all(jnp.isfinite(follow), axis=0)
     alike: Any = alike_of(jnp.asarray(samples))
-    _, averages = average(jnp.where(usable, steer, 0), follow, usable, alike)
-    filtered = jnp.moveaxis(averages, 0, -1)
+    number, averages = average(jnp.where(usable, steer, 0), follow, usable, alike)
+    filtered = jnp.moveaxis(jnp.where(number > NOTHING, averages, follow), 0, -1)
     ends = np.cumsum([layer.shape[-1] for layer in following])[:-1].tolist()
     return tuple(jnp.split(filtered, ends, axis=-1))
 

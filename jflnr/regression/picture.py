@@ -122,8 +122,9 @@ def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Part
     images |= {"brightness": xp.broadcast_to(unit, (len(light), 1, 1))}
     if picture.colours is None:
         return images
-    own = [light_in(picture, layer) for layer in (clean.emission, clean.environment)]
-    images |= {"emitted": own[0], "environment": own[1]}
+    for name, shining in (("own_noisy", picture), ("own_clean", clean)):
+        own = (shining.emission, shining.environment)
+        images[name] = tuple(light_in(picture, layer) for layer in own)
     return images | {"colours": (picture.colours, clean.colours)}
 
 
@@ -251,11 +252,14 @@ def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
         # What is emitted is no brighter than the picture.
         share = xp.minimum(image / xp.where(own > 0, own, 1), 1)
         share = xp.where(own > 0, share, 1)
-        emitted = share * parts["emitted"]
-        environment = parts["environment"] * (share if alpha is None else 1)
-        passes, left = split(xp.maximum(image - share * own, 0), noisy, *images)
-        planes = [passes, parts["colours"][1], emitted + left, environment]
-        given["passes"] = xp.concatenate(planes, axis=-1)
+        emitted, environment = parts["own_clean"]
+        emitted, environment = share * emitted, environment * (share if alpha is None else 1)
+        reflected = xp.where(known, xp.maximum(image - share * own, 0), 0)
+        passes, left = split(reflected, noisy, *images)
+        planes = passes, parts["colours"][1], emitted + left, environment
+        before = parts["lobes"], parts["colours"][0], *parts["own_noisy"]
+        written = (xp.concatenate(each, axis=-1) for each in (planes, before))
+        given["passes"] = xp.where(known, *written)
     if method.with_error:
         given["error"] = parts["error"]
     return given

@@ -205,6 +205,42 @@ def test_the_device_takes_pixels_that_are_not_finite_without_a_word(cutout: Fram
     np.testing.assert_allclose(found, right, atol=2e-3 * right.max())
 
 
+@pytest.mark.parametrize("backend", ["jax", "opencl"])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("emitted", np.nan), ("emitted", np.inf), ("seen_albedo", np.nan), ("alpha", np.nan)],
+)
+def test_what_is_nowhere_near_a_number_passes_through(
+    cutout: Frame, name: str, value: float, backend: str
+) -> None:
+    """Where so much of a layer is missing that the filter fills nothing in; the passes too."""
+    if backend == "opencl":
+        pytest.importorskip("pyopencl")
+    frame = dataclasses.replace(cutout, beauty=cutout.beauty + 0.5, emitted=cutout.emitted + 0.5)
+    layer = np.array(getattr(frame, name))
+    layer[2:32, 10:50] = value
+    frame = dataclasses.replace(frame, **{name: layer})
+    picture, passes = jflnr.denoise(frame, LOBES, backend=backend)
+    middle = np.s_[14:20, 26:34]
+    shown = np.concatenate([frame.beauty, frame.alpha], axis=-1)
+    np.testing.assert_array_equal(picture[middle], shown[middle])
+    layers = frame.lobes, frame.lobe_colours, frame.emitted, frame.environment
+    np.testing.assert_array_equal(passes[middle], np.concatenate(layers, axis=-1)[middle])
+    assert np.isfinite(picture[:, 56:]).all() and np.isfinite(passes[:, 56:]).all()
+
+
+@pytest.mark.parametrize("backend", ["jax", "opencl"])
+def test_an_infinity_of_one_pixel_says_nothing_of_the_picture(
+    cutout: Frame, clean: tuple, backend: str
+) -> None:
+    if backend == "opencl":
+        pytest.importorskip("pyopencl")
+    emitted = np.array(cutout.emitted)
+    emitted[2, 3] = np.inf
+    image = jflnr.denoise(dataclasses.replace(cutout, emitted=emitted), FEW, backend=backend)
+    np.testing.assert_allclose(image[:, 32:], clean[0][:, 32:], atol=5e-3 * clean[0].max())
+
+
 def test_the_device_needs_no_jax(source: Path, tmp_path: Path) -> None:
     pytest.importorskip("pyopencl")
     code = "import sys; from jflnr.cli import main; main(); print('jax' in sys.modules)"
