@@ -21,6 +21,8 @@ else:
             self.name = name
 
         def __getattr__(self, attribute: str) -> Any:
+            if self.name != "jax":  # which has settings too
+                check_not_forked("JAX", RuntimeError)
             return getattr(importlib.import_module(self.name), attribute)
 
     jax, jnp, lax = _Lazy("jax"), _Lazy("jax.numpy"), _Lazy("jax.lax")

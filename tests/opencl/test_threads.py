@@ -28,9 +28,14 @@ def test_threads_get_what_one_gets(
 
 FORKED = """
 import os, sys
+import jflnr
 from experiments.threads import made_up
-from jflnr import Denoiser
-denoise, (frame,) = Denoiser("flr", backend=sys.argv[1]), made_up(1)
+(frame,) = made_up(1)
+denoise = {
+    "function": lambda frame: jflnr.flr(frame.indirect, frame.normal),
+    "jax": jflnr.Denoiser("flr"),
+    "opencl": jflnr.Denoiser("flr", backend="opencl"),
+}[sys.argv[1]]
 denoise(frame)
 if os.fork() == 0:
     try:
@@ -42,8 +47,8 @@ os.wait()
 """
 
 
-@pytest.mark.parametrize("backend", jflnr.BACKENDS)
-def test_a_fork_after_use_is_one_sentence(context: Context, backend: str) -> None:
-    command = [sys.executable, "-W", "ignore", "-c", FORKED, backend]
+@pytest.mark.parametrize("used", [*jflnr.BACKENDS, "function"])
+def test_a_fork_after_use_is_one_sentence(context: Context, used: str) -> None:
+    command = [sys.executable, "-W", "ignore", "-c", FORKED, used]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert "start processes with" in done.stdout and not done.stderr
