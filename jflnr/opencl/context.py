@@ -186,7 +186,7 @@ class Context:
         if place is None:
             return self._build(text, options)
         if (binary := kept.read(place)) is not None:
-            # A damaged one, or one that another driver left, is as good as none.
+            # One that another driver left is as good as none.
             with contextlib.suppress(self.cl.Error):
                 return self.cl.Program(self.context, [self.device], [binary]).build()
         self._to_keep[place] = program = self._build(text, options)

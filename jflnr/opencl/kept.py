@@ -12,6 +12,8 @@ from jflnr.files import replacing
 
 # Bytes that are kept; those used longest ago go first.
 MOST = 1 << 27
+# Bytes that a file starts with, to tell whether the rest is what was written.
+DIGEST = hashlib.sha256().digest_size
 
 
 def folder() -> Path | None:
@@ -32,13 +34,14 @@ def place_of(device: Any, text: str, options: list[str]) -> Path | None:
 
 
 def read(place: Path) -> bytes | None:
-    """What is kept there, and is now the last used."""
+    """What is kept there, and is now the last used; None if it is damaged: drivers crash then."""
     try:
         kept = place.read_bytes()
         place.touch()
     except OSError:
         return None
-    return kept
+    told, binary = kept[:DIGEST], kept[DIGEST:]
+    return binary if told == hashlib.sha256(binary).digest() else None
 
 
 def write(place: Path, binary: bytes) -> None:
@@ -46,7 +49,7 @@ def write(place: Path, binary: bytes) -> None:
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with replacing(place) as beside:
-            beside.write_bytes(binary)
+            beside.write_bytes(hashlib.sha256(binary).digest() + binary)
         kept = sorted(
             ((path.stat().st_mtime, path.stat().st_size, path) for path in place.parent.iterdir()),
             reverse=True,

@@ -63,10 +63,17 @@ def test_programs_are_kept_with_the_code_of_their_kernels(
     with monkeypatch.context() as patch:
         patch.setattr(Context, "_build", None)
         np.testing.assert_array_equal(again(), right)
-    for damaged in found:
-        damaged.write_bytes(b"no program")
-    np.testing.assert_array_equal(again(), right)
-    assert all(len(path.read_bytes()) > 100 for path in found)
+    contents = [path.read_bytes() for path in found]
+    middle = len(min(contents, key=len)) // 2
+    for damaged in (
+        lambda content: b"no program",
+        lambda content: content[:middle],
+        lambda content: content[:middle] + bytes(64) + content[middle + 64 :],
+    ):
+        for path, content in zip(found, contents, strict=True):
+            path.write_bytes(damaged(content))
+        np.testing.assert_array_equal(again(), right)
+        assert all(len(path.read_bytes()) > middle for path in found)
     monkeypatch.setattr(kept, "MOST", 0)
     kept.write(folder / "more", b"one more")
     assert not list(folder.iterdir())
