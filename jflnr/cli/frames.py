@@ -136,7 +136,8 @@ class Worker:
     def _reported(self, job: Job, stage: Callable[[], Any]) -> Any:
         """What the stage returns, or the record of why it failed."""
         try:
-            return stage()
+            with np.errstate(all="ignore"):  # of any numbers in a file; what counts is said
+                return stage()
         except INPUT_ERRORS as error:
             return failure(job, error)
 
