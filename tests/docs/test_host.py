@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import jflnr
 from docs.launches import launches, parameters, tables
+from jflnr.images.inputs import prepare
 from jflnr.opencl import NoDevice
 from jflnr.regression.flr import DEFAULT, flr
 
@@ -43,13 +45,29 @@ def test_c_host_computes_what_jax_does(host: list[str], tmp_path: Path) -> None:
     guides = np.concatenate([np.sin(x), np.cos(y), x * y, x + 2, np.sin(3 * x + y)], axis=-1)
     light = (1 + guides[..., :3] ** 2) * rng.exponential(size=(height, width, 3))
     light, guides = light.astype(np.float32), guides.astype(np.float32)
-    for name, image in (("light", light), ("guides", guides)):
-        image.tofile(tmp_path / f"{name}.raw")
-    files = [str(tmp_path / f"{name}.raw") for name in ("light", "guides", "denoised")]
-    subprocess.run([*host, str(width), str(height), *files], check=True)
-    found = np.fromfile(files[2], np.float32).reshape(light.shape)
+    found = denoised(host, tmp_path, light, guides)
     expected = np.asarray(flr(light, guides, DEFAULT))
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("backend", jflnr.BACKENDS)
+def test_c_host_computes_what_denoise_does(
+    host: list[str], tmp_path: Path, frame: jflnr.Frame, backend: str
+) -> None:
+    names, inputs = prepare(frame, None, DEFAULT)
+    guides = np.concatenate(DEFAULT.images(inputs, names)["guides"], axis=-1).astype(np.float32)
+    found = denoised(host, tmp_path, np.asarray(frame.indirect, np.float32), guides)
+    expected = np.asarray(jflnr.denoise(frame, "flr", backend=backend))
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def denoised(host: list[str], folder: Path, light: np.ndarray, guides: np.ndarray) -> np.ndarray:
+    for name, image in (("light", light), ("guides", guides)):
+        image.tofile(folder / f"{name}.raw")
+    files = [str(folder / f"{name}.raw") for name in ("light", "guides", "denoised")]
+    height, width = light.shape[:2]
+    subprocess.run([*host, str(width), str(height), *files], check=True)
+    return np.fromfile(files[2], np.float32).reshape(light.shape)
 
 
 @pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
