@@ -119,7 +119,7 @@ def test_one_method_is_the_default_everywhere(still: Frame) -> None:
 def test_it_is_the_default_on_a_device_too(still: Frame) -> None:
     context = device()
     images = [
-        on_device.step(on_device.start(still, context), still, *method, context=context)[1]
+        on_device.step(on_device.start(still, context=context), still, *method, context=context)[1]
         for method in ((), (method_of(),))
     ]
     np.testing.assert_array_equal(*images)

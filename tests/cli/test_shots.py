@@ -43,7 +43,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[Frame]:
     """In place of the denoiser, the mean of all frames so far; the frames that it was given."""
     seen: list[Frame] = []
 
-    def start(frame: Frame) -> dict:
+    def start(frame: Frame, **_: object) -> dict:
         return {"count": np.zeros(1), "sum": np.zeros_like(frame.indirect)}
 
     def step(state: dict, frame: Frame, method: str, **_: object) -> tuple[dict, np.ndarray]:
@@ -256,7 +256,7 @@ def test_a_fitted_block_is_used_over_time(shot: Path, tmp_path: Path) -> None:
     params, out = tmp_path / "p.json", tmp_path / "out"
     save_parameters(params, FLR(6, 1e-3, 1e-3), block=4)
     assert run(shot, "-o", out, "--params", params, "--guides", "depth") == 0
-    state = temporal.start(read_frame(shot / NAMES[0]))
+    state = temporal.start(read_frame(shot / NAMES[0]), guides=("depth",))
     method = FLR(6, 1e-3, 1e-3, block=4)
     for name in NAMES:
         frame = read_frame(shot / name)
