@@ -128,7 +128,9 @@ def margins(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         line = {"sequence": row["shot"].replace("_", ", "), "method": row["method"]}
         for other, title in MARGIN.items():
             if (theirs := by.get((row["shot"], other))) is not None:
-                line[f"PSNR above {title}"] = row["psnr"] - theirs["psnr"]
+                ours, other_psnr = row["psnr_unbiased"], theirs["psnr_unbiased"]
+                if ours is not None and other_psnr is not None:
+                    line[f"PSNR above {title}"] = ours - other_psnr
                 line[f"warped error below {title}, times"] = theirs["warped"] / row["warped"]
                 if row.get("false") and theirs.get("false"):
                     line[f"false change below {title}, times"] = theirs["false"] / row["false"]
