@@ -250,7 +250,7 @@ def levels_of(method: AdaptiveFLR, moments: jax.Array, known: Known) -> tuple[Fi
     """`fit_levels`, from the weighted moments and one plane of their noise."""
     grid, shift = Grid(moments[:-1], moments[-1:], method.finest), known["shift"]
     channels = channels_of(grid.moments, shift.size)
-    return fit_levels(grid, shift, channels, method.levels, known["mean"], method)
+    return fit_levels(grid, shift, channels, known["mean"], method)
 
 
 def learn_rate(method: Any, known: Known, sums: Parts) -> Known:

@@ -75,21 +75,6 @@ def predict(coefficients: jax.Array, regressors: jax.Array) -> jax.Array:
     return jnp.einsum("qchw,qhw,c->hw", coefficients, regressors, weights)
 
 
-class Windowed(NamedTuple):
-    """A grid under its windows, ready to be solved.
-
-    moments: `(K, h, w)`, of Q guides and, with slopes, of the position. shift: of these guides.
-    eps, eps_prime: `(h, w)`, regularisation. variance: `(h, w)`, of the mean brightness.
-    """
-
-    moments: jax.Array
-    shift: jax.Array
-    eps: jax.Array
-    eps_prime: jax.Array
-    variance: jax.Array
-    window: Window
-
-
 def guide_features(grid: Grid, guides: int, numbers: AdaptiveFLR) -> jax.Array:
     """What of the guides must be alike inside a window, `(Q, h, w)`."""
     return numbers.guide_scale * mean_guides(grid.moments, guides)[1:]
@@ -105,35 +90,17 @@ def fit_level(
     *,
     slopes: bool = True,
 ) -> Fit:
-    """The models of one level, of the guides alone. features: of the guides alone if None; the
-    rest as of `windowed`."""
-    if features is None:
-        features = guide_features(grid, shift.size, numbers)
-    system = windowed(grid, features, shift, channels, mean, numbers, slopes=slopes)
-    regular = system.eps, system.eps_prime
-    coefficients = solve_strips(system.moments, system.shift, *regular, channels)
-    return Fit(coefficients[: shift.size + 1], system.variance, system.window)
-
-
-def windowed(
-    grid: Grid,
-    features: jax.Array,
-    shift: jax.Array,
-    channels: int,
-    mean: jax.Array,
-    numbers: AdaptiveFLR,
-    *,
-    slopes: bool = True,
-) -> Windowed:
-    """The normal equations of one level.
+    """The models of one level, of the guides alone.
 
     The variance of a weighted mean, sum(w^2 r^2) / sum(w)^2 with residuals r, tells how noisy the
     window's brightness is. The regularisation grows with it: where the signal drowns, slopes go.
 
-    features: `(F, h, w)`, what must be alike in a window. mean: brightness of the whole frame.
-    slopes: whether the position in the window is a guide too.
+    mean: brightness of the whole frame. features: `(F, h, w)`, what must be alike in a window; that
+    of the guides if None. slopes: whether the position in the window is fitted as a guide too.
     """
     guides, positions = shift.size, 2 if slopes else 0
+    if features is None:
+        features = guide_features(grid, guides, numbers)
     window = window_over(features, numbers.sigma)
     moments = (
         gather_moments(grid.moments, window, numbers.sigma, guides, channels)
@@ -154,5 +121,6 @@ def windowed(
     for i in range(guides + 1, guides + 1 + positions):
         moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
     centred = jnp.concatenate([shift, jnp.zeros(positions, shift.dtype)])
-    eps, eps_prime = numbers.eps + ridge, numbers.eps_prime + ridge
-    return Windowed(moments, centred, eps, eps_prime, variance, window)
+    regular = numbers.eps + ridge, numbers.eps_prime + ridge
+    coefficients = solve_strips(moments, centred, *regular, channels)
+    return Fit(coefficients[: guides + 1], variance, window)

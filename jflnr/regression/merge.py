@@ -5,7 +5,7 @@ from __future__ import annotations
 from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.level import Fit, Grid, mean_guides, predict
-from jflnr.regression.resampling import double, halve
+from jflnr.regression.resampling import halve
 from jflnr.regression.window import Window, gather
 
 
@@ -38,11 +38,3 @@ def signal_share(
     inverse = divide(1, count, 1e-12)
     power, noise = power * inverse, noise * inverse
     return jnp.maximum(power - caution * noise, 0) / jnp.maximum(power, 1e-9)
-
-
-def interpolate(fit: Fit, height: int, width: int) -> Fit:
-    """The models of a level on the next finer grid."""
-    return fit._replace(
-        coefficients=double(fit.coefficients, height, width),
-        variance=double(fit.variance, height, width),
-    )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
-from jflnr.regression.merge import interpolate, signal_share
+from jflnr.regression.merge import signal_share
 from jflnr.regression.resampling import double, halve
 
 if TYPE_CHECKING:
@@ -21,15 +20,13 @@ TILE = 8
 class Step(NamedTuple):
     """One level finer than what was known before.
 
-    fine: its fit. coarse: that of the coarser level, on this grid. luminance: `(h, w)`, brightness
-    known before. share: on the coarser grid, how much of their difference is signal. merged: models
-    `(Q + 1, C, h, w)` with that share added.
+    fine: its fit. coarse: that of the coarser level, on this grid. share: on the coarser grid, how
+    much of their difference is signal. merged: models `(Q + 1, C, h, w)` with that share added.
     """
 
     grid: Grid
     fine: Fit
     coarse: Fit
-    luminance: jax.Array
     share: jax.Array
     merged: jax.Array
 
@@ -40,26 +37,35 @@ def merged_models(coarsest: Fit, steps: list[Step]) -> jax.Array:
 
 
 def fit_levels(
-    grid: Grid, shift: jax.Array, channels: int, levels: int, mean: jax.Array, numbers: AdaptiveFLR
+    grid: Grid, shift: jax.Array, channels: int, mean: jax.Array, numbers: AdaptiveFLR
 ) -> tuple[Fit, list[Step]]:
     """The fit of the coarsest grid, and the steps from there to the finest."""
-    grids = grid.pyramid(levels)
-
-    def fit(grid: Grid, features: jax.Array, coarse: Fit) -> Fit:
+    *finer, coarsest = grid.pyramid(numbers.levels)
+    first = fit_level(coarsest, shift, channels, mean, numbers)
+    coarse, merged, steps = first, first.coefficients, list[Step]()
+    for grid in reversed(finer):
+        size, window, finest = grid.moments.shape[1:], coarse.window, grid is finer[0]
+        coarse = coarse._replace(
+            coefficients=double(coarse.coefficients, *size), variance=double(coarse.variance, *size)
+        )
+        merged = double(merged, *size)
+        luminance = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
+        # Windows end where what is known so far of the brightness changes.
+        edge = numbers.brightness_scale * jnp.log(luminance / mean + 0.1)
+        features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
-        slopes = grid is not grids[0]
-        return fit_level(grid, shift, channels, mean, numbers, features, slopes=slopes)
-
-    coarsest = fit_level(grids[-1], shift, channels, mean, numbers)
-    last, steps = (coarsest, coarsest.coefficients), list[Step]()
-    for grid in reversed(grids[:-1]):
-        where = None
-        if grid is grids[0] and steps and numbers.worth is not None:
-            where = chosen(steps[-1].share, numbers.worth, *grid.moments.shape[1:])
-        steps.append(refine(grid, *last, shift.size, mean, numbers, fit, where))
-        last = steps[-1].fine, steps[-1].merged
-    return coarsest, steps
+        fine = fit_level(grid, shift, channels, mean, numbers, features, slopes=not finest)
+        if finest and steps and numbers.worth is not None:
+            where = chosen(steps[-1].share, numbers.worth, *size)
+            models = jnp.where(where, fine.coefficients, coarse.coefficients)
+            fine = Fit(models, jnp.where(where, fine.variance, coarse.variance), fine.window)
+        reference = luminance**2 + 0.01 * mean**2
+        share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
+        merged = merged + double(share, *size) * (fine.coefficients - coarse.coefficients)
+        steps.append(Step(grid, fine, coarse, share, merged))
+        coarse = fine
+    return first, steps
 
 
 def in_tiles(share: jax.Array) -> jax.Array:
@@ -75,35 +81,3 @@ def chosen(share: jax.Array, worth: jax.Array | float, height: int, width: int) 
     """
     where = in_tiles(share) > worth
     return jnp.repeat(jnp.repeat(where, TILE, 0), TILE, 1)[:height, :width]
-
-
-def refine(
-    grid: Grid,
-    coarse: Fit,
-    merged: jax.Array,
-    guides: int,
-    mean: jax.Array,
-    numbers: AdaptiveFLR,
-    fit: Callable[[Grid, jax.Array, Fit], Fit],
-    where: jax.Array | None = None,
-) -> Step:
-    """One level finer: its own fit, and what is merged so far with its share added.
-
-    coarse, merged: of the coarser grid. fit: makes the models of this one, from what must be alike
-    inside a window, `(F, h, w)`, and the coarser fit on this grid. where: `(h, w)`, from
-    `chosen`; elsewhere nothing is added.
-    """
-    size, window = grid.moments.shape[1:], coarse.window
-    coarse, merged = interpolate(coarse, *size), double(merged, *size)
-    luminance = jnp.maximum(predict(merged, mean_guides(grid.moments, guides)), 0)
-    # Windows end where what is known so far of the brightness changes.
-    edge = numbers.brightness_scale * jnp.log(luminance / mean + 0.1)
-    features = jnp.concatenate([guide_features(grid, guides, numbers), edge[None]])
-    fine = fit(grid, features, coarse)
-    reference = luminance**2 + 0.01 * mean**2
-    if where is not None:
-        models = jnp.where(where, fine.coefficients, coarse.coefficients)
-        fine = Fit(models, jnp.where(where, fine.variance, coarse.variance), fine.window)
-    share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
-    merged = merged + double(share, *size) * (fine.coefficients - coarse.coefficients)
-    return Step(grid, fine, coarse, luminance, share, merged)

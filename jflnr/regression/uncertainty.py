@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, mean_guides, predict
@@ -20,37 +18,20 @@ LEFT_OUT = 0.4
 DETAIL = 0.0054
 
 
-class Error(NamedTuple):
-    """Parts of the expected squared error of the brightness, `(h, w)`: the variance of what the
-    models keep, and the square of what the merge left out."""
+def block_error(coarsest: Fit, steps: Sequence[Step]) -> jax.Array:
+    """Expected squared error of the brightness at the finest blocks, `(h, w)`, but for `DETAIL`.
 
-    variance: jax.Array
-    left_out: jax.Array
-
-    @classmethod
-    def of(cls, coarsest: Fit) -> Error:
-        """That of the coarsest grid."""
-        return cls(coarsest.variance, jnp.zeros_like(coarsest.variance))
-
-    def after(self, step: Step) -> Error:
-        """That of the next finer grid.
-
-        The increments from level to level do not correlate, and of an increment with noise N of
-        which the Wiener filter keeps a share, the expected squared error is share N.
-        """
-        size, count = step.luminance.shape, step.merged.shape[0] - 1
+    It is made of the variance of what the models keep, and of the square of what the merge left
+    out. The increments from level to level do not correlate, and of an increment with noise N of
+    which the Wiener filter keeps a share, the expected squared error is share N.
+    """
+    variance, left_out = coarsest.variance, jnp.zeros_like(coarsest.variance)
+    for step in steps:
+        size, count = step.fine.variance.shape, step.merged.shape[0] - 1
         share = double(step.share, *size)
         noise = jnp.maximum(step.fine.variance - step.coarse.variance, 0)
         change = step.fine.coefficients - step.coarse.coefficients
         dropped = (1 - share) * predict(change, mean_guides(step.grid.moments, count))
-        variance, left_out = (double(part, *size) for part in self)
-        return Error(variance + share * noise, left_out + dropped**2)
-
-    def square(self) -> jax.Array:
-        """The expected squared error, `(h, w)`, but for `DETAIL`."""
-        return VARIANCE * self.variance + LEFT_OUT * self.left_out
-
-
-def block_error(coarsest: Fit, steps: Sequence[Step]) -> jax.Array:
-    """Expected squared error of the brightness at the finest blocks, `(h, w)`, but for `DETAIL`."""
-    return functools.reduce(Error.after, steps, Error.of(coarsest)).square()
+        variance = double(variance, *size) + share * noise
+        left_out = double(left_out, *size) + dropped**2
+    return VARIANCE * variance + LEFT_OUT * left_out
