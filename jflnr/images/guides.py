@@ -15,7 +15,8 @@ FAR = 3
 
 
 def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
-    """The guides to use: those asked for, or by default those of normal, depth, ao that exist.
+    """The guides to use: those asked for, or by default those of normal, depth, ao that exist, in
+    the order of `NAMES`.
 
     Raises `ValueError` for a name that is no guide, is named twice, or that the frame lacks.
     """
@@ -29,7 +30,7 @@ def choose(frame: Frame, names: Sequence[str] | None) -> tuple[str, ...]:
             raise ValueError(f"guides: the frame has no {name} layer; it has {', '.join(there)}")
     if len(set(names)) < len(names):
         raise ValueError(f"guides: {', '.join(names)} names one of them twice")
-    return tuple(names)
+    return tuple(name for name in NAMES if name in names)
 
 
 class Scene(NamedTuple):

@@ -15,9 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from jflnr.frame import Frame
-from jflnr.images.guides import Scene
-from jflnr.images.inputs import robust_images, same_size
-from jflnr.images.noisy_guides import FILTERS, Filters
+from jflnr.images.inputs import same_size
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import features, unet
 from jflnr.regression import adaptive
@@ -87,17 +85,6 @@ class FLNR(AdaptiveFLR):
     def tells_error(self) -> bool:
         """The network reads it."""
         return True
-
-    @staticmethod
-    def images(
-        frame: Frame,
-        names: Sequence[str],
-        scene: Scene | None = None,
-        filters: Filters = FILTERS,
-    ) -> Parts:
-        """The guides in the order in which the network takes them."""
-        ordered = tuple(name for name in GUIDES if name in names)
-        return robust_images(frame, ordered, scene, filters)
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> FLNR:
         same_size(frame, self.name)

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from jflnr.frame import Frame
-from jflnr.images.guides import Scene, scene_of
-from jflnr.images.noisy_guides import FILTERS, Filters
-from jflnr.lazy import jax, jit, jnp, pytree
+from jflnr.images.guides import Scene
+from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import unet
 from jflnr.network.features import BRIGHTEST, DARK, doubts, luminance
 from jflnr.network.flnr import COLOURS, DEEPEST, gains
@@ -126,6 +125,30 @@ def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
     return Read(*light, **parts["surfaces"] | others), unit
 
 
+def surfaces_of(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
+    """What the network reads of the surfaces. guides: as `picture` takes them."""
+    picture = picture_in(frame, scene)
+    xp: Any = picture.beauty.__array_namespace__()
+    there = [name for name in GUIDES if getattr(picture, name) is not None]
+    clean = dict(zip(there, guides, strict=True))
+    number = lambda image: xp.where(xp.isfinite(image), image, 0)
+    albedo, normal = number(clean["albedo"]), number(clean["normal"])
+    left = number(picture.normal) - normal
+    none, one = xp.zeros_like(normal), xp.ones_like(normal[..., :1])
+    guess = xp.where(scene.averaged, SAMPLES, 1) * one
+    samples = guess if frame.samples is None else frame.samples
+    surfaces = {
+        "albedo": albedo,
+        "albedo_left": xp.clip(number(picture.albedo), 0, 1) - albedo,
+        "normal": normal,
+        "normal_left": xp.sqrt(xp.einsum("...c,...c", left, left))[..., None],
+        "seen_normal": number(clean.get("seen_normal", none)),
+        "depth": xp.clip(number(clean.get("depth", one)), 0, DEEPEST),
+        "samples": xp.where(samples > 0, samples, guess),
+    }
+    return {"surfaces": surfaces, "noisy_own": own_light(picture)}
+
+
 @pytree
 @dataclass(frozen=True)
 class PictureFLNR(WholePicture):
@@ -138,6 +161,7 @@ class PictureFLNR(WholePicture):
     name: ClassVar[str] = "flnr-picture"
     read: ClassVar[Any] = Read
     to_read: ClassVar[Any] = staticmethod(to_read)
+    others: ClassVar[Any] = staticmethod(surfaces_of)
 
     params: Any = None
 
@@ -157,19 +181,6 @@ class PictureFLNR(WholePicture):
         from jflnr.network.weights import shipped
 
         return dataclasses.replace(self, params=shipped(self.name, Read))
-
-    def images(
-        self,
-        frame: Frame,
-        names: tuple[str, ...],
-        scene: Scene | None = None,
-        filters: Filters = FILTERS,
-    ) -> Parts:
-        """Those of `picture`, and what the network reads of the surfaces."""
-        scene = scene_of(frame) if scene is None else scene
-        images = super().images(frame, names, scene, filters)
-        add = _surfaces if filters.layers is None else _surfaces.__wrapped__
-        return images | add(frame, scene, images["guides"])
 
     def before_network(self) -> tuple[Stage, ...]:
         """The stages before the one that corrects."""
@@ -208,27 +219,3 @@ def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
 def corrected(params: unet.Params, read: Read) -> Any:
     """The picture `(H, W, 3)` that the network makes of what it reads."""
     return read.corrected(gains(params, read))
-
-
-@jit
-def _surfaces(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
-    picture = picture_in(frame, scene)
-    xp: Any = picture.beauty.__array_namespace__()
-    there = [name for name in GUIDES if getattr(picture, name) is not None]
-    clean = dict(zip(there, guides, strict=True))
-    number = lambda image: xp.where(xp.isfinite(image), image, 0)
-    albedo, normal = number(clean["albedo"]), number(clean["normal"])
-    left = number(picture.normal) - normal
-    none, one = xp.zeros_like(normal), xp.ones_like(normal[..., :1])
-    guess = xp.where(scene.averaged, SAMPLES, 1) * one
-    samples = guess if frame.samples is None else frame.samples
-    surfaces = {
-        "albedo": albedo,
-        "albedo_left": xp.clip(number(picture.albedo), 0, 1) - albedo,
-        "normal": normal,
-        "normal_left": xp.sqrt(xp.einsum("...c,...c", left, left))[..., None],
-        "seen_normal": number(clean.get("seen_normal", none)),
-        "depth": xp.clip(number(clean.get("depth", one)), 0, DEEPEST),
-        "samples": xp.where(samples > 0, samples, guess),
-    }
-    return {"surfaces": surfaces, "noisy_own": own_light(picture)}

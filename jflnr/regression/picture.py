@@ -157,6 +157,9 @@ class WholePicture(AdaptiveFLR):
         *("normal", "seen_albedo", "seen_normal", "depth", "position"),
     )
 
+    # What is read besides, of the frame, its scene and the guides.
+    others: ClassVar[Callable[..., Parts]] = staticmethod(lambda frame, scene, guides: {})
+
     slack: jax.Array | float = 0.005
     block: int = field(default=BLOCK, metadata={"static": True})
     lobes: bool = field(default=False, metadata={"static": True})
@@ -185,9 +188,8 @@ class WholePicture(AdaptiveFLR):
     ) -> Parts:
         """The light of the surfaces, the guides, and what makes it a picture again."""
         scene = scene_of(frame) if scene is None else scene
-        if filters.layers is None:
-            return _images(frame, scene)
-        return _images.__wrapped__(frame, scene, filters.layers)
+        make = _images if filters.layers is None else _images.__wrapped__
+        return make(frame, scene, filters.layers, self.others)
 
     def stages(self) -> tuple[Stage, ...]:
         fit = super().stages()
@@ -265,13 +267,15 @@ def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
     return given
 
 
-@jit
-def _images(frame: Frame, scene: Scene, filtered: Callable[..., Any] | None = None) -> Parts:
+@functools.partial(jit, static_argnames=("filtered", "others"))
+def _images(
+    frame: Frame, scene: Scene, filtered: Callable[..., Any] | None, others: Callable[..., Parts]
+) -> Parts:
     picture = picture_in(frame, scene)
     assert scene.averaged is not None and scene.light is not None and scene.lit is not None
     clean = cleaned(picture, scene.light, frame.samples, scene.averaged, filtered)
     images = images_of(picture, clean, scene.light, scene.lit)
-    return images | {"lobes": frame.lobes}
+    return images | {"lobes": frame.lobes} | others(frame, scene, images["guides"])
 
 
 def picture_in(frame: Frame, scene: Scene) -> Picture:
