@@ -23,18 +23,10 @@ INLINE void add_blocks(
             const long pixel = (long)row * width + x0;
             const int last = MIN(right - x0, WIDTH) - 1;
             real x[Q + 1], y[C], light = 0;
-            if (last == WIDTH - 1)
-                read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
-            else
-                read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
-            const real one = usable(weight, pixel, last, x, y);
+            const real one =
+                read_usable(target, GUIDE_IMAGES, weight, shift, pixel, last, x, y);
 #pragma unroll
-            for (int q = 0; q < Q; ++q) x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
-#pragma unroll
-            for (int c = 0; c < C; ++c) {
-                y[c] = one > 0 ? y[c] : (real)0;
-                light += BRIGHTNESS(c) * y[c];
-            }
+            for (int c = 0; c < C; ++c) light += BRIGHTNESS(c) * y[c];
             sums[K] += one * light * light;
             sums[K + 1] += one * one;
             add_products(sums, one, x, y);

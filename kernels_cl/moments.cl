@@ -32,16 +32,11 @@ kernel void moments(
             const long pixel = (long)row * width + x0;
             const int last = MIN(right - x0, WIDTH) - 1;
             real x[Q + 1], y[C];
-            if (last == WIDTH - 1)
-                read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
-            else
-                read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
-            const real one = usable(weight, pixel, last, x, y);
-#pragma unroll
-            for (int q = 0; q < Q; ++q) x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
+            const real one =
+                read_usable(target, GUIDE_IMAGES, weight, shift, pixel, last, x, y);
             // Divided before they are summed: radiance near the largest float must not overflow.
 #pragma unroll
-            for (int c = 0; c < C; ++c) y[c] = one > 0 ? y[c] * (1.0f / (BLOCK * BLOCK)) : (real)0;
+            for (int c = 0; c < C; ++c) y[c] *= 1.0f / (BLOCK * BLOCK);
             add_products(sums, one, x, y);
         }
     }

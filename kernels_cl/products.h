@@ -69,6 +69,23 @@ INLINE real usable(
     return zero == 0 ? counts : (real)0;
 }
 
+// Reads pixels as both do: x less the shift, and how much each counts; where it does not, x and y are 0.
+INLINE real read_usable(
+    global const target_t *target, GUIDE_PARAMETERS, global const weight_t *weight,
+    constant float *shift, long pixel, int last, real *x, real *y)
+{
+    if (last == WIDTH - 1)
+        read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
+    else
+        read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
+    const real one = usable(weight, pixel, last, x, y);
+#pragma unroll
+    for (int q = 0; q < Q; ++q) x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
+#pragma unroll
+    for (int c = 0; c < C; ++c) y[c] = one > 0 ? y[c] : (real)0;
+    return one;
+}
+
 // Adds the products of [1, X, Y], times `one`, to the K sums. x and y are 0 where `one` is, and where
 // that is all it can be besides 1 it need not be multiplied in: FRACTIONS, if it can be more.
 INLINE void add_products(real *sums, real one, const real *x, const real *y)

@@ -47,22 +47,12 @@ INLINE void add_pixels(
     float per_mean, float exponent, float offset, real *sums)
 {
     real x[Q + 1], y[C];
-    if (last == WIDTH - 1)
-        read_pixels(target, GUIDE_IMAGES, pixel, WIDTH - 1, x, y);
-    else
-        read_pixels(target, GUIDE_IMAGES, pixel, last, x, y);
-    real one = usable(weight, pixel, last, x, y);
+    real one = read_usable(target, GUIDE_IMAGES, weight, shift, pixel, last, x, y);
     real expected = above[0] + below * down[0], light = 0;
 #pragma unroll
-    for (int q = 0; q < Q; ++q) {
-        x[q] = one > 0 ? from_shift(x[q], shift[q]) : (real)0;
-        expected += x[q] * (above[q + 1] + below * down[q + 1]);
-    }
+    for (int q = 0; q < Q; ++q) expected += x[q] * (above[q + 1] + below * down[q + 1]);
 #pragma unroll
-    for (int c = 0; c < C; ++c) {
-        y[c] = one > 0 ? y[c] : (real)0;
-        light += BRIGHTNESS(c) * y[c];
-    }
+    for (int c = 0; c < C; ++c) light += BRIGHTNESS(c) * y[c];
     real variance = MAX(expected * per_mean, 1e-6f);
 #ifndef PROPORTIONAL
     variance = pow(variance, (real)exponent);
