@@ -3,40 +3,34 @@
 They look at static facts only (shapes, types, plain numbers), so they also run while JAX traces.
 """
 
-import functools
+import contextlib
 import sys
-from collections.abc import Callable, Collection
-from typing import Any, TypeVar
-
-F = TypeVar("F", bound=Callable[..., Any])
+from collections.abc import Collection, Iterator
+from typing import Any
 
 
-def one_sentence(function: F) -> F:
-    """The function, which says in one sentence what JAX and OpenCL say in paragraphs.
+@contextlib.contextmanager
+def one_sentence() -> Iterator[None]:
+    """Around a function or some lines: what JAX and OpenCL say in paragraphs, in one sentence.
 
     Raises `TypeError` for what JAX traces and nothing can trace, `MemoryError` and `OSError` for
     what a device has no room for or fails in.
     """
-
-    @functools.wraps(function)
-    def run(*given: Any, **named: Any) -> Any:
-        try:
-            return function(*given, **named)
-        except Exception as error:
-            jax, cl = sys.modules.get("jax"), sys.modules.get("pyopencl")
-            first = next(iter(str(error).splitlines()), "")
-            if jax and isinstance(error, jax.errors.JAXTypeError):
-                raise TypeError(
-                    "jax.jit, jax.vmap and jax.grad go through methods on the jax backend only, "
-                    "without tile"
-                ) from None
-            if jax and isinstance(error, jax.errors.JaxRuntimeError) and "EXHAUSTED" in first:
-                raise MemoryError(f"the device has too little memory: {first}") from None
-            if cl and isinstance(error, cl.Error):
-                raise OSError(f"the OpenCL device failed: {first}") from error
-            raise
-
-    return run  # type: ignore[return-value]
+    try:
+        yield
+    except Exception as error:
+        jax, cl = sys.modules.get("jax"), sys.modules.get("pyopencl")
+        first = next(iter(str(error).splitlines()), "")
+        if jax and isinstance(error, jax.errors.JAXTypeError):
+            raise TypeError(
+                "jax.jit, jax.vmap and jax.grad go through methods on the jax backend only, "
+                "without tile"
+            ) from None
+        if jax and isinstance(error, jax.errors.JaxRuntimeError) and "EXHAUSTED" in first:
+            raise MemoryError(f"the device has too little memory: {first}") from None
+        if cl and isinstance(error, cl.Error):
+            raise OSError(f"the OpenCL device failed: {first}") from error
+        raise
 
 
 def choice(name: str, value: object, options: Collection[object]) -> None:

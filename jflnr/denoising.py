@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import importlib
@@ -26,21 +27,17 @@ if TYPE_CHECKING:
 SHIPPED_FRAME = Path(__file__).parent / "data" / "room.exr"
 
 
-def _own_settings(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function in float32, with the promotions it was written for, whatever JAX is told."""
-
-    @functools.wraps(function)
-    @checks.one_sentence
-    def wrapped(self: Denoiser, *given: Any, **named: Any) -> Any:
-        if "jax" not in sys.modules and self.backend == "opencl":
-            return function(self, *given, **named)
-        if self.backend == "jax":
+@contextlib.contextmanager
+def _own_settings(backend: str) -> Iterator[None]:
+    """Float32, and the promotions that the code was written for, whatever JAX is told."""
+    with checks.one_sentence(), contextlib.ExitStack() as settings:
+        if backend == "jax":
             check_not_forked("JAX", RuntimeError)
-        rank, kind = jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard")
-        with jax.enable_x64(False), rank, kind:
-            return function(self, *given, **named)
-
-    return wrapped
+        if "jax" in sys.modules or backend == "jax":
+            settings.enter_context(jax.numpy_rank_promotion("allow"))
+            settings.enter_context(jax.numpy_dtype_promotion("standard"))
+            settings.enter_context(jax.enable_x64(False))
+        yield
 
 
 def _native(frame: Frame) -> Frame:
@@ -171,35 +168,40 @@ class Denoiser:
         block = block_for(method.block, max(np.shape(frame.normal)[:2], default=1))
         return method if block == method.block else dataclasses.replace(method, block=block)
 
-    @_own_settings
     def __call__(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise a frame by itself; its light is written to `out`, if given, and returned."""
-        frame = _native(frame)
+        with _own_settings(self.backend):
+            frame = _native(frame)
+            return _given(self._alone(frame, out), frame, out)
+
+    def _alone(self, frame: Frame, out: np.ndarray | None) -> Parts:
         method = self.method_for(frame)
         names, inputs = prepare(frame, self.guides, method)
         method = method.for_frame(inputs, names)
         if hasattr(method, "step"):
-            light = self._step(self.start(frame), frame)[1]
-            return _given({"image": light}, frame, out)
+            return {"image": self._step(self.start(frame), frame)[1]}
         if self.tile is not None:
-            return _given(self._tiled(inputs, names, self.tile), frame, out)
+            from jflnr.large.source import rows_of
+
+            found = [parts for _, parts in self.strips(rows_of(inputs), names, self.tile)]
+            return {name: np.concatenate([parts[name] for parts in found]) for name in found[0]}
         if self.backend == "jax":
-            return _given(on_frame(method, inputs, names), frame, out)
+            return on_frame(method, inputs, names)
         from jflnr.opencl.twins import filters_on
 
         images = method.images(inputs, names, filters=filters_on(self.context))
-        return _given(self._on_device(method)(images, out), frame, out)
+        return self._on_device(method)(images, out)
 
-    @_own_settings
     def next(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise the next frame of a shot, with what those before it left (docs/temporal.md).
 
         frame: with `motion`. `state` is what is left to the next one; None begins another shot.
         """
-        frame = _native(frame)
-        state = self.start(frame) if self.state is None else self.state
-        self.state, light = self._step(state, frame)
-        return _given({"image": light}, frame, out)
+        with _own_settings(self.backend):
+            frame = _native(frame)
+            state = self.start(frame) if self.state is None else self.state
+            self.state, light = self._step(state, frame)
+            return _given({"image": light}, frame, out)
 
     @functools.cached_property
     def context(self) -> Any:
@@ -224,31 +226,21 @@ class Denoiser:
         `denoise`. folder: for temporary files; the system's own if None.
         Yields the first row of each strip, and by name `image`, `(h, W, C)`, and more.
         """
-        parts = self._strips(rows, names, tile, folder)
-        while (found := self._next_of(parts)) is not None:
-            yield found
-
-    @_own_settings
-    def _next_of(self, parts: Iterator[tuple[int, Parts]]) -> tuple[int, Parts] | None:
-        return next(parts, None)
-
-    def _strips(
-        self, rows: Rows, names: tuple[str, ...], tile: int, folder: Path | None
-    ) -> Iterator[tuple[int, Parts]]:
         from jflnr.large import tiled
 
-        shapes = rows.shapes()
-        method = self.method_for(shapes).for_frame(shapes, names)
+        with _own_settings(self.backend):
+            shapes = rows.shapes()
+            method = self.method_for(shapes).for_frame(shapes, names)
         if self.backend == "jax":
-            yield from tiled.strips(rows, method, names, tile, folder)
+            parts = tiled.strips(rows, method, names, tile, folder)
         else:
-            yield from tiled.overlapping(rows, method, names, tile, self._on_device(method))
-
-    def _tiled(self, frame: Frame, names: tuple[str, ...], tile: int) -> Parts:
-        from jflnr.large.source import rows_of
-
-        found = [parts for _, parts in self.strips(rows_of(frame), names, tile)]
-        return {name: np.concatenate([parts[name] for parts in found]) for name in found[0]}
+            parts = tiled.overlapping(rows, method, names, tile, self._on_device(method))
+        while True:
+            with _own_settings(self.backend):  # which are the caller's own in between
+                found = next(parts, None)
+            if found is None:
+                return
+            yield found
 
     def start(self, frame: Frame) -> Any:
         """The state before the first frame of a shot, of which only the shapes count."""

@@ -16,10 +16,10 @@ LARGEST = 1 << 20  # bytes of a file that are looked at
 
 
 def numbers_of(method: Any) -> dict[str, float]:
-    """The numbers of a method by name."""
+    """The numbers of a method by name, but for those of a network."""
     fields = [f.name for f in dataclasses.fields(method) if not f.metadata.get("static")]
     values = {name: getattr(method, name) for name in fields}
-    return {name: float(value) for name, value in values.items() if value is not None}
+    return {n: float(v) for n, v in values.items() if v is not None and not isinstance(v, dict)}
 
 
 def save_parameters(path: str | Path, method: Any, **about: Any) -> None:

@@ -12,7 +12,6 @@ from jflnr.opencl.apply import Restored, apply
 from jflnr.opencl.arguments import (
     check_guides,
     in_passes,
-    numbers_of,
     to_image,
     to_layers,
     to_output,
@@ -29,6 +28,7 @@ from jflnr.opencl.resampling import halve
 from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weigh import collect_blocks
 from jflnr.opencl.weighted_moments import collect_weighted
+from jflnr.parameters import numbers_of
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
 from jflnr.regression.arguments import channel_count, check_same_size
 from jflnr.regression.auto import Auto
@@ -50,7 +50,7 @@ class Step(NamedTuple):
 BRIGHT = 1e15
 
 
-@one_sentence
+@one_sentence()
 @in_passes
 def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flr_adaptive` on an OpenCL device: same arguments, same result.
@@ -142,7 +142,9 @@ def write_light(
 
     Writes `image`, `(H, W, C)`, and, if it is given, the standard error to `error`, `(H, W, 1)`.
     """
-    block, shift, numbers = method.finest, centre(context, guides), numbers_of(method)
+    block, shift = method.finest, centre(context, guides)
+    plain: dict[str, Any] = numbers_of(method)
+    numbers = dataclasses.replace(method, **plain)
     run = Run(context, channel_count(guides), target.shape[2], numbers, shift, None)
     collect = collect_blocks if isinstance(method, Auto) else collect_pixels
     run, light, grid = collect(run, (target, guides, weight, guides_map), block)

@@ -1,6 +1,5 @@
 """Arguments of the regressions, from arrays of numpy or JAX to what the kernels can read."""
 
-import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any
@@ -68,21 +67,6 @@ def in_passes(regress: Callable[..., Any]) -> Callable[..., Any]:
         return (result, *error) if error else result
 
     return run
-
-
-def numbers_of(method: Any) -> Any:
-    """The method with its numbers as those of Python; other fields stay."""
-    fields = ((field, getattr(method, field.name)) for field in dataclasses.fields(method))
-    return dataclasses.replace(
-        method,
-        **{
-            field.name: float(value)
-            for field, value in fields
-            if value is not None
-            and not isinstance(value, dict)
-            and not field.metadata.get("static")
-        },
-    )
 
 
 def to_image(values: Any) -> Any:

@@ -24,7 +24,7 @@ def start(frame: Frame, context: Context | None = None) -> History:
     return History(0, surface, zeros(1), zeros(3), zeros(3), zeros(3))
 
 
-@one_sentence
+@one_sentence()
 def step(
     history: History,
     frame: Frame,

@@ -14,7 +14,7 @@ from jflnr.opencl.energy import rescale
 from jflnr.opencl.grids import Images
 
 
-@one_sentence
+@one_sentence()
 @in_passes
 def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flnr` on an OpenCL device; all else as of `jflnr.opencl.flr_adaptive`."""

@@ -21,7 +21,7 @@ from jflnr.regression.arguments import check_regression, layers_of
 from jflnr.regression.flr import DEFAULT, FLR
 
 
-@one_sentence
+@one_sentence()
 @in_passes
 def flr(
     target: Any,

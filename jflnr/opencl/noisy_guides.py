@@ -9,7 +9,7 @@ from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import guide_arguments, guide_defines
 
 
-@one_sentence
+@one_sentence()
 def smooth_guide(guide: Any, normal: Any, depth: Any, context: Context | None = None) -> Any:
     """Average a guide over 3 x 3 pixels of the same surface: along rows, then along columns.
 

@@ -39,7 +39,7 @@ def start(
     return State(surface, light, zeros(count), image, no_evidence(context, height, width))
 
 
-@one_sentence
+@one_sentence()
 def step(
     state: State,
     frame: Frame,

@@ -49,7 +49,7 @@ class Auto(AdaptiveFLR):
         return light, pilot, moments, *rest
 
 
-@one_sentence
+@one_sentence()
 def signal_in_tiles(
     frame: Frame, method: Auto | None = None, guides: Sequence[str] | None = None
 ) -> tuple[np.ndarray, int]:
