@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -26,14 +26,6 @@ from jflnr.stages import Known, Parts, Stage
 
 # The first row of a strip, and what the last stage gives for it: `image` and more, `(h, W, C)`.
 Strip = tuple[int, Parts]
-
-
-class Kept(NamedTuple):
-    """What a stage gave, in a file. lead: axes before `(h, w)`."""
-
-    planes: Planes
-    side: int
-    lead: tuple[int, ...]
 
 
 @dataclass
@@ -52,7 +44,7 @@ class Job:
     folder: Path | None
     files: ExitStack
     known: Known = field(default_factory=dict)
-    kept: dict[str, Kept] = field(default_factory=dict)
+    kept: dict[str, Planes] = field(default_factory=dict)
 
     def places(self, stage: Stage) -> list[tuple[Piece, Piece]]:
         """Rows and columns of the parts that a stage is run on, in pixels."""
@@ -72,21 +64,18 @@ class Job:
         frame = self.rows.read(rows.low, rows.high) if stage.pixels else None
         return _run(stage, self.method, frame, self.names, self.scene, parts, self.known)
 
-    def _read(self, kept: Kept, rows: Piece, columns: Piece) -> Any:
+    def _read(self, kept: Planes, rows: Piece, columns: Piece) -> Any:
         rows, columns = rows.on(kept.side), columns.on(kept.side)
-        found = kept.planes[rows.outer, columns.outer]
-        found = found.reshape(*kept.lead, *found.shape[1:])
+        found = kept[rows.outer, columns.outer]
         return np.moveaxis(found, 0, -1) if kept.side == 0 else found
 
     def keep(self, name: str, side: int, inner: np.ndarray, rows: Piece, columns: Piece) -> None:
         """Keep `(..., h, w)` of one part for later stages."""
         if name not in self.kept:
-            size = [-(-length // (side or 1)) for length in (self.rows.height, self.rows.width)]
-            lead = inner.shape[:-2]
-            planes = self.files.enter_context(Planes(self.folder, math.prod(lead), *size))
-            self.kept[name] = Kept(planes, side, lead)
-        flat = inner.reshape(-1, *inner.shape[-2:])
-        self.kept[name].planes[rows.on(side).inner, columns.on(side).inner] = flat
+            h, w = (-(-length // (side or 1)) for length in (self.rows.height, self.rows.width))
+            self.kept[name] = Planes(self.folder, inner.shape[:-2], (h, w), side)
+            self.files.callback(self.kept[name].file.close)
+        self.kept[name][rows.on(side).inner, columns.on(side).inner] = inner
 
 
 def strips(

@@ -53,10 +53,11 @@ def test_pieces_cover_the_line_once_and_reach_far_enough(size, step, reach, alig
 
 def test_planes_are_what_was_written(rng, tmp_path):
     image = rng.random((3, 7, 11), np.float32)
-    with Planes(tmp_path, 3, 7, 11) as planes:
-        planes[0:4, :] = image[:, :4]
-        planes[4:7, 2:11] = image[:, 4:, 2:]
-        np.testing.assert_array_equal(planes[1:6, 3:9], image[:, 1:6, 3:9])
+    planes = Planes(tmp_path, (3,), (7, 11))
+    planes[0:4, :] = image[:, :4]
+    planes[4:7, 2:11] = image[:, 4:, 2:]
+    np.testing.assert_array_equal(planes[1:6, 3:9], image[:, 1:6, 3:9])
+    planes.file.close()
     assert not list(tmp_path.iterdir())
 
 
