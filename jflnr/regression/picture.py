@@ -84,20 +84,23 @@ def cleaned(
     averaged: Array,
     filtered: Callable[..., Any] | None = None,
 ) -> Picture:
-    """The picture with layers that are free of noise.
+    """The picture with layers, but for the beauty, that are free of noise.
 
     unit: brightness of the picture, `()`. samples: per pixel, or `(H, W, 1)`; 0 if nobody says how
     many, None if there may be none but of the pixels' centres. averaged: whether the layers show
     that they are means of several, `()`. filtered: `filter_layers`, or that of a device.
     """
     xp: Any = picture.beauty.__array_namespace__()
-    if samples is not None:
-        guess = xp.where(averaged, SAMPLES, 1)
-        return filter_picture(picture, unit, xp.where(samples > 0, samples, guess), filtered)
-    clean = filter_picture(picture, unit, SAMPLES, filtered)
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
-    chosen = {name: xp.where(averaged, getattr(clean, name), layers[name]) for name in layers}
-    return picture._replace(**chosen)
+    layers.pop("beauty")
+    number: Any = SAMPLES
+    if samples is not None:
+        number = xp.where(samples > 0, samples, xp.where(averaged, SAMPLES, 1))
+    found = (filtered or filter_layers)(layers, xp.maximum(unit, 1e-12), number)
+    clean = dict(zip(layers, found, strict=True))
+    if samples is None:
+        clean = {name: xp.where(averaged, clean[name], layer) for name, layer in layers.items()}
+    return picture._replace(**clean)
 
 
 def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Parts:
@@ -312,19 +315,6 @@ def light_in(picture: Picture, *parts: Array | None) -> Array:
     xp: Any = picture.beauty.__array_namespace__()
     there = [part for part in parts if part is not None]
     return functools.reduce(xp.add, there) if there else xp.zeros_like(picture.beauty)
-
-
-def filter_picture(
-    picture: Picture,
-    unit: Array,
-    samples: Array | float,
-    filtered: Callable[..., Any] | None = None,
-) -> Picture:
-    """Every layer but the beauty without its noise. unit: brightness of the picture, `()`."""
-    layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
-    xp: Any = layers.pop("beauty").__array_namespace__()
-    found = (filtered or filter_layers)(layers, xp.maximum(unit, 1e-12), samples)
-    return picture._replace(**dict(zip(layers, found, strict=True)))
 
 
 def filter_layers(
