@@ -22,7 +22,7 @@ from jflnr.regression import adaptive
 from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
 from jflnr.regression.apply import guides_to_map
 from jflnr.regression.arguments import layers_of
-from jflnr.regression.moments import Guides
+from jflnr.regression.moments import Guides, usable
 from jflnr.stages import Known, Parts, Stage
 
 # Guides that the network was trained with: normal (3), depth and, where a frame has it, occlusion.
@@ -38,24 +38,20 @@ LARGEST = 1.5
 def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
     """The images that the network reads, from those of adaptive FLR and its results, and the unit
     of their light."""
-    target = parts["target"]
-    guides = jnp.concatenate(layers_of(guides_to_map(parts)), axis=-1)
-    usable = jnp.all(jnp.isfinite(target), axis=-1) & jnp.all(jnp.isfinite(guides), axis=-1)
-    if parts["weight"] is not None:
-        usable &= parts["weight"] > 0
-    usable = usable[..., None]
+    target, guides = parts["target"], jnp.concatenate(layers_of(guides_to_map(parts)), axis=-1)
+    there = usable(target, guides, parts["weight"])[..., None]
 
     def shown(image: jax.Array) -> jax.Array:
         # The bound parts two divisions, whose divisors' product may be less than any number.
         bounded = jnp.clip(image / known["unit"], 0, features.BRIGHTEST * known["mean"])
-        return jnp.where(usable, bounded / known["mean"], 0)
+        return jnp.where(there, bounded / known["mean"], 0)
 
     groups = (*target.shape[:2], target.shape[2] // COLOURS, COLOURS)
     light, noisy = (x.reshape(groups).sum(2) for x in (parts["fitted"], target))
     lowest, highest = jnp.asarray(LIMITS, guides.dtype)[:, : guides.shape[2]]
-    guides = jnp.where(usable, jnp.clip(guides, lowest, highest), 0)
-    ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(usable, 1.0, 0.0)
-    mask = usable.astype(light.dtype)
+    guides = jnp.where(there, jnp.clip(guides, lowest, highest), 0)
+    ao = guides[..., 4:5] if guides.shape[2] > 4 else jnp.where(there, 1.0, 0.0)
+    mask = there.astype(light.dtype)
     images = shown(light), shown(noisy), shown(parts["noise"]), guides[..., :3], guides[..., 3:4]
     read = features.Read(*images, ao.astype(mask.dtype), mask)  # type: ignore[call-arg]
     return read, known["mean"] * known["unit"]

@@ -104,11 +104,10 @@ def write(
 ) -> None:
     """Write the light, `(H, W, C)`, with the brightness of the input if that is to be kept, and, if
     that is not None, its error."""
-    target, _, weight, _ = images
-    image = context.empty(target.shape) if method.keep_energy else output
-    write_light(context, *images, method, image, error)
+    image = context.empty(output.shape) if method.keep_energy else output
+    write_light(context, images, method, image, error)
     if method.keep_energy:
-        rescale(context, image, target, weight, output, error=error)
+        rescale(context, image, images, output, error=error)
 
 
 def in_unit(target: Any) -> tuple[Any, np.float32]:
@@ -129,25 +128,19 @@ def in_unit(target: Any) -> tuple[Any, np.float32]:
 
 
 def write_light(
-    context: Context,
-    target: Any,
-    guides: tuple[Any, ...],
-    weight: Any | None,
-    guides_map: tuple[Any, ...],
-    method: AdaptiveFLR,
-    image: Any,
-    error: Any | None = None,
+    context: Context, images: Images, method: AdaptiveFLR, image: Any, error: Any | None = None
 ) -> Run:
     """The passes over the pixels, and what happens on blocks between them.
 
     Writes `image`, `(H, W, C)`, and, if it is given, the standard error to `error`, `(H, W, 1)`.
     """
+    target, guides, _, guides_map = images
     block, shift = method.finest, centre(context, guides)
     plain: dict[str, Any] = numbers_of(method)
     numbers = dataclasses.replace(method, **plain)
     run = Run(context, channel_count(guides), target.shape[2], numbers, shift, None)
     collect = collect_blocks if isinstance(method, Auto) else collect_pixels
-    run, light, grid = collect(run, (target, guides, weight, guides_map), block)
+    run, light, grid = collect(run, images, block)
     w = -(-target.shape[1] // (2 * block))
     steps, merged = fit_levels(run, grid, block, method.levels)
     scale, own = restore(run, merged, light, w), own_light(run, merged, grid)
@@ -163,9 +156,9 @@ def collect_pixels(run: Run, images: Images, block: int) -> tuple[Run, Any, Grid
     target, guides, weight, _ = images
     light = collect(run.context, target, guides, run.shift, 2 * block, weight, light=True)
     w = -(-target.shape[1] // (2 * block))
-    run = run._replace(mean=frame_mean(run.context, light, w, run.guides, run.channels))
+    run = run._replace(mean=frame_mean(run, light, w))
     pilot = fit_pilot(run, light, w, block)
-    return run, light, collect_weighted(run, target, guides, pilot, weight, block)
+    return run, light, collect_weighted(run, images, pilot, block)
 
 
 def fit_levels(run: Run, moments: Grid, block: int, levels: int) -> tuple[list[Step], Grid]:

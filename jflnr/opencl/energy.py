@@ -3,19 +3,18 @@
 from typing import Any
 
 from jflnr.opencl.context import Context
-from jflnr.opencl.grids import Grid, Run, brightness_defines
+from jflnr.opencl.grids import Grid, Images, Run, brightness_defines
 from jflnr.opencl.moments import pixel_defines
 
 
-def frame_mean(context: Context, moments: Any, w: int, guides: int, channels: int) -> Any:
+def frame_mean(run: Run, moments: Any, w: int) -> Any:
     """Mean brightness of the usable pixels, 1 if there is no light, and the sum of blocks, `(2,)`.
 
-    moments: `(K, h, pitch)`, of the brightness, with w columns. guides, channels: the numbers
-    Q and C.
+    moments: `(K, h, pitch)`, of the brightness, with w columns.
     """
-    h, pitch = moments.shape[1:]
+    context, (h, pitch) = run.context, moments.shape[1:]
     partial, mean = context.empty((h, 2)), context.empty((2,))
-    defines = {"Q": guides, "C": channels, "WIDTH": 1}
+    defines = {"Q": run.guides, "C": run.channels, "WIDTH": 1}
     context.run("light_rows", "energy.cl", defines, (h,), (h, w, pitch, moments, partial))
     context.run("light_mean", "energy.cl", defines, (1,), (h, partial, mean))
     return mean
@@ -42,19 +41,17 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
 def rescale(
     context: Context,
     image: Any,
-    target: Any,
-    weight: Any | None,
+    images: Images,
     output: Any,
     slack: float = 0.0,
     error: Any | None = None,
 ) -> None:
     """Scale the result so that its brightness sums to the input's over the pixels that count.
 
-    slack: share by which it may differ. error: `(H, W, 1)` float32, is scaled likewise.
-
-    image: `(H, W, C)` float32. target: `(H, W, C)`. weight: `(H, W)` or None. output: `(H, W, C)`,
-    float32 or float16, is written; it may be `image`.
+    image: `(H, W, C)` float32. output: `(H, W, C)`, float32 or float16, is written; it may be
+    `image`. slack: share by which it may differ. error: `(H, W, 1)` float32, is scaled likewise.
     """
+    target, _, weight, _ = images
     height, width, channels = image.shape
     partial, ratio = context.empty((height, 2)), context.empty((1,))
     defines = pixel_defines(target, (), weight, 1) | brightness_defines(channels)

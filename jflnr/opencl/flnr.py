@@ -24,14 +24,12 @@ def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> An
 def write(context: Context, images: Images, method: FLNR, output: Any, error: Any) -> None:
     """Write the corrected light, `(H, W, C)`, with about the brightness of the input, and, if that
     is not None, its error."""
-    target, _, weight, guides = images
-    light, image = context.empty(target.shape), context.empty(target.shape)
-    noise = context.empty((*target.shape[:2], 1)) if error is None else error
-    run = write_light(context, *images, method, light, noise)
-    read = target, guides, weight, light, noise, run.mean
-    network.correct(context, method.params, *read, image)
+    light, image = context.empty(output.shape), context.empty(output.shape)
+    noise = context.empty((*output.shape[:2], 1)) if error is None else error
+    run = write_light(context, images, method, light, noise)
+    network.correct(context, method.params, images, light, noise, run.mean, image)
     slack = 0.0 if method.keep_energy else float(method.slack)
-    rescale(context, image, target, weight, output, slack)
+    rescale(context, image, images, output, slack)
 
 
 def picture_light(target: Any, guides: Any, method: PictureFLNR, **options: Any) -> tuple[Any, Any]:

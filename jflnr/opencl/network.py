@@ -13,6 +13,7 @@ from jflnr.network.flnr import LARGEST
 from jflnr.opencl.arguments import to_device
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import GROUP as MARGIN
+from jflnr.opencl.grids import Images
 from jflnr.opencl.moments import guide_arguments, guide_defines, pixel_defines
 
 # Neighbours and outputs that one work-item computes: the 12 sums stay in a processor's 16 registers
@@ -53,9 +54,7 @@ def _vectors(context: Context) -> int:
 def correct(
     context: Context,
     params: unet.Params,
-    target: Any,
-    guides: tuple[Any, ...],
-    weight: Any | None,
+    images: Images,
     light: Any,
     error: Any,
     mean: Any,
@@ -63,13 +62,14 @@ def correct(
 ) -> None:
     """Write `light` `(H, W, C)`, corrected, to `output`, both float32; arguments on the device.
 
-    target, guides, weight: as adaptive FLR took them. error: `(H, W, 1)`, of `light`. mean: of the
-    frame's brightness.
+    images: as adaptive FLR took them. error: `(H, W, 1)`, of `light`. mean: of the frame's
+    brightness.
     """
+    target, _, weight, guides = images
     size = light.shape[:2]
     defines = pixel_defines(target, guides, weight, 1) | {"BRIGHTEST": f"{features.BRIGHTEST}f"}
-    images = target, *guide_arguments(guides), weight, light, error, mean
-    x, said = _said(context, params, size, features.Read.PIXEL, defines, images)
+    read = target, *guide_arguments(guides), weight, light, error, mean
+    x, said = _said(context, params, size, features.Read.PIXEL, defines, read)
     defines = {"COUNTS": x.channels, "PIXEL": features.Read.PIXEL, "MASK": MASK}
     _write(context, said, (x.values,), light, output, defines)
 

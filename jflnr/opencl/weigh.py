@@ -18,7 +18,7 @@ def collect_blocks(run: Run, images: Images, block: int) -> tuple[Run, Any, Grid
     light = run.context.empty((plane_count(run.guides, 1), *size))
     fine = run.grid(2 * (run.guides + 1) + 1, size[0], w)
     run.launch("light_moments", "weigh.cl", fine, (*size, h, pitch, blocks.planes, light))
-    run = run._replace(mean=frame_mean(run.context, light, w, run.guides, run.channels))
+    run = run._replace(mean=frame_mean(run, light, w))
     pilot = fit_pilot(run, light, w, block)
     doubled = *fine.size, *pilot.sizes, pilot.planes, fine.planes
     run.launch("double_pilot", "weigh.cl", fine, doubled)

@@ -1,20 +1,16 @@
 """Host side of kernels_cl/weighted_moments.cl; the twin is in jflnr/regression/moments.py."""
 
-from typing import Any
-
-from jflnr.opencl.grids import Grid, Run, brightness_defines, lanes_of
+from jflnr.opencl.grids import Grid, Images, Run, brightness_defines, lanes_of
 from jflnr.opencl.moments import guide_arguments, pixel_defines
 from jflnr.regression.moments import plane_count
 
 
-def collect_weighted(
-    run: Run, target: Any, guides: tuple[Any, ...], pilot: Grid, weight: Any | None, block: int
-) -> Grid:
+def collect_weighted(run: Run, images: Images, pilot: Grid, block: int) -> Grid:
     """Pass 2: moments of the weighted pixels on the finest blocks, and one plane of noise.
 
-    target: `(H, W, C)`. guides: each `(H, W, Q_i)`. pilot: models of the brightness on blocks four
-    times as large. weight: `(H, W)`, float32 or bool, or None.
+    pilot: models of the brightness on blocks four times as large.
     """
+    target, guides, weight, _ = images
     height, width, channels = target.shape
     h, w = -(-height // block), -(-width // block)
     moments = run.grid(plane_count(run.guides, channels) + 1, h, w)

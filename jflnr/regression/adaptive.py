@@ -29,6 +29,7 @@ from jflnr.regression.moments import (
     collect_weighted,
     index_xy,
     unit_of,
+    usable,
 )
 from jflnr.regression.multiscale import TILE, Step, fit_levels, merged_models
 from jflnr.regression.resampling import halve
@@ -222,11 +223,18 @@ def fit_pilot(method: Any, parts: Parts, known: Known) -> Parts:
 
 
 def collect_moments(method: Any, parts: Parts, known: Known) -> Parts:
-    """Pass 2: moments of the weighted pixels on the finest blocks, and one plane of their noise."""
+    """Pass 2: moments of the weighted pixels on the finest blocks, and one plane of their noise.
+
+    The variance of a pixel grows with its brightness, and the best weight is one over it.
+    """
     target, guides, shift = parts["target"], parts["guides"], known["shift"]
     expected = apply(parts["pilot"], guides, shift, 4 * method.finest)[..., 0]
     light = light_of(target, known["unit"])
-    weights, squares = _weights(light, guides, expected, known["mean"], parts["weight"], method)
+    weights = weight_of(expected, known["mean"], method)
+    weights *= 1 if parts["weight"] is None else parts["weight"]
+    there = usable(light[..., None], guides, parts["weight"])
+    weights = jnp.where(there, weights, 0)
+    squares = jnp.where(there, weights * (light - expected), 0) ** 2
     weighted = target, guides, shift, weights, squares, method.finest, known["unit"]
     return {"moments": jnp.concatenate(collect_weighted(*weighted))}
 
@@ -279,9 +287,7 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
 def before_and_after(image: jax.Array, parts: Parts, unit: jax.Array) -> jax.Array:
     """Brightness of the pixels that count, noisy and denoised, over `unit`: `(2, H, W)`."""
     light = light_of(parts["target"])
-    counts = jnp.isfinite(light)
-    if parts["weight"] is not None:
-        counts &= parts["weight"] > 0
+    counts = usable(light[..., None], (), parts["weight"])
     return jnp.where(counts, jnp.stack([light / unit, light_of(image) / unit]), 0)
 
 
@@ -310,28 +316,3 @@ def weight_of(expected: jax.Array, mean: jax.Array, numbers: Any) -> jax.Array:
     # The bound is there for the logarithm; written so, the power takes a quarter of the time.
     relative = jnp.log(jnp.maximum(expected / mean, 1e-6))
     return 1 / (jnp.exp(numbers.exponent * relative) + numbers.offset)
-
-
-def _weights(
-    light: jax.Array,
-    guides: Guides,
-    expected: jax.Array,
-    mean: jax.Array,
-    weight: jax.Array | None,
-    numbers: Any,
-) -> tuple[jax.Array, jax.Array]:
-    """Each pixel's weight from what the pilot expects, and the noise that leaves.
-
-    The variance of a pixel grows with its brightness, and the best weight is one over it.
-    light, expected: `(H, W)`.
-    Returns the weights, 0 where a pixel cannot be used, and squared weighted residuals, `(H, W)`.
-    """
-    weights = weight_of(expected, mean, numbers)
-    usable = jnp.isfinite(light)
-    for layer in jax.tree.leaves(guides):
-        usable &= jnp.all(jnp.isfinite(layer), axis=-1)
-    if weight is not None:
-        usable &= (weight > 0) & jnp.isfinite(weight)
-        weights *= weight
-    weights = jnp.where(usable, weights, 0)
-    return weights, jnp.where(usable, weights * (light - expected), 0) ** 2

@@ -96,6 +96,16 @@ def from_shift(plane: jax.Array, shift: jax.Array) -> jax.Array:
     return jnp.clip(plane - shift, -FARTHEST, FARTHEST)
 
 
+def usable(target: jax.Array, guides: Guides, weight: jax.Array | None) -> jax.Array:
+    """Which pixels count, `(H, W)`: those that are finite and, by their weight, there."""
+    layers = jax.tree.leaves((target, guides))
+    finite = (jnp.all(jnp.isfinite(layer), axis=-1) for layer in layers)
+    good = functools.reduce(jnp.logical_and, finite)
+    if weight is None:
+        return good
+    return good & (weight if weight.dtype == bool else (weight > 0) & jnp.isfinite(weight))
+
+
 def working_type(*arrays: jax.Array) -> jnp.dtype:
     """Moments are kept in float32 at least, whatever the frame is stored in."""
     return jnp.result_type(jnp.float32, *(array.dtype for array in arrays))
@@ -152,11 +162,7 @@ def _strip_moments(
     x = [from_shift(p.astype(dtype), s) for p, s in zip(planes(guides), shift, strict=True)]
     # Divided before they are summed: radiance near the type's maximum must not overflow.
     y = [plane.astype(dtype) * (1 / block**2) for plane in planes(target)]
-    good = jnp.all(jnp.isfinite(target), axis=-1)
-    for layer in jax.tree.leaves(guides):
-        good &= jnp.all(jnp.isfinite(layer), axis=-1)
-    if weight is not None:
-        good &= weight if weight.dtype == bool else (weight > 0) & jnp.isfinite(weight)
+    good = usable(target, guides, weight)
     x = [jnp.where(good, plane, 0) for plane in x]
     y = [jnp.where(good, plane, 0) for plane in y]
     one = good.astype(dtype)

@@ -122,10 +122,11 @@ def test_what_it_corrects(
     params, mean = outspoken((4, 5, 6, 7)), np.float32(1.7)
     known = {"mean": mean, "unit": np.float32(1)}
     right = jax.jit(twin.correct)(FLNR(params=params), parts, known)["image"]
-    images = context.array(target), to_layers(context, parts["guides"])
+    read = to_layers(context, parts["guides"])
+    images = context.array(target), read, to_weight(context, weight), read
     of_light = (context.array(array) for array in (light, wrong, np.array([mean, 0], np.float32)))
     output = context.empty(shape)
-    network.correct(context, params, *images, to_weight(context, weight), *of_light, output)
+    network.correct(context, params, images, *of_light, output)
     assert error(output.get(), np.asarray(right)) < tolerances.NETWORK_WHOLE
 
 
@@ -135,9 +136,10 @@ def test_whole(context: Context) -> None:
     right, right_error = by_jax()(target, guides, weight, params)
     found = flnr(target, guides, params=params, weight=weight, context=context)
     assert error(found, np.asarray(right)) < tolerances.ADAPTIVE
-    images = context.array(to_image(target)), to_layers(context, guides)
+    layers = to_layers(context, guides)
+    images = context.array(to_image(target)), layers, to_weight(context, weight), layers
     light, wrong = context.empty(target.shape), context.empty((*SIZE, 1))
-    write_light(context, *images, to_weight(context, weight), FLNR(), light, wrong)
+    write_light(context, images, FLNR(), light, wrong)
     assert error(wrong.get(), np.asarray(right_error)) < tolerances.ADAPTIVE
 
 
