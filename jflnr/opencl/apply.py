@@ -30,9 +30,8 @@ def apply(
     output: Any,
     restored: Restored | None = None,
 ) -> None:
-    """Evaluate the models, interpolated bilinearly between block centres, on every pixel.
+    """`jflnr.regression.apply.apply` of models `(Q + 1, C, h, pitch)`, guides each `(H, W, Q_i)`.
 
-    model: `(Q + 1, C, h, pitch)`, from `solve`. guides: each `(H, W, Q_i)`. shift: `(max(Q, 1),)`.
     step: distance of the models in pixels. sizes: blocks down and across, and pitch. output:
     `(H, W, C)`, float32 or float16, is written. restored: for models as in kernels_cl/models.h.
     """

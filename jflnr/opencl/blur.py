@@ -16,11 +16,7 @@ def gaussian_taps(sigma: float, reach: int) -> np.ndarray:
 
 
 def blur(context: Context, moments: Any, sigma: float, reach: int) -> Any:
-    """Convolve every plane with a Gaussian, taking zeros outside the frame.
-
-    moments: `(K, h, pitch)` on the device. sigma: standard deviation in blocks. reach: blocks on
-    each side that the window extends over. Returns `(K, h, pitch)`; its padding is not zero.
-    """
+    """`jflnr.regression.blur.blur` of `(K, h, pitch)`; the result's padding is not zero."""
     planes, h, pitch = moments.shape
     width = context.width()
     margin = -(-reach // width) * width

@@ -53,10 +53,7 @@ def pixel_defines(
 
 
 def centre(context: Context, guides: tuple[Any, ...], weight: Any | None = None) -> Any:
-    """A typical value of each guide, `(max(Q, 1),)`, from a sparse grid of pixels.
-
-    guides: device arrays `(H, W, Q_i)`. weight: as in `collect`; pixels of weight 0 do not count.
-    """
+    """`jflnr.regression.moments.centre` of device arrays `(H, W, Q_i)`: `(max(Q, 1),)`."""
     defines = {**guide_defines(guides, 1), **weight_defines(weight), "WIDTH": 1, "BLOCK": 1}
     count = defines["Q"]
     shift = context.empty((max(count, 1),))
@@ -82,10 +79,9 @@ def collect(
     weight: Any | None = None,
     light: bool = False,
 ) -> Any:
-    """Mean over each block of the outer products of [1, X - shift, Y] (section 3.2, kernel 1).
+    """`jflnr.regression.moments.collect` of device arrays, the guides each `(H, W, Q_i)`.
 
-    target: `(H, W, C)`. guides: each `(H, W, Q_i)`. shift: from `centre`. weight: `(H, W)`,
-    float32 or bool, or None. All are device arrays. light: take the brightness for Y (C = 1).
+    light: take the brightness for Y (C = 1).
     Returns `(K, ceil(H/block), pitch)`, zero from column ceil(W/block) on.
     """
     height, width = target.shape[:2]

@@ -11,11 +11,7 @@ from jflnr.opencl.moments import guide_arguments, guide_defines
 
 @one_sentence()
 def smooth_guide(guide: Any, normal: Any, depth: Any, context: Context | None = None) -> Any:
-    """Average a guide over 3 x 3 pixels of the same surface: along rows, then along columns.
-
-    guide: `(H, W, 1)`. normal: `(H, W, 3)`. depth: `(H, W, 1)`. Returns `(H, W, 1)` float32, on the
-    device.
-    """
+    """`jflnr.images.noisy_guides.smooth_guide` of one channel; the result is on the device."""
     context = default_context() if context is None else context
     layers = to_layers(context, (normal, depth, guide))
     height, width = normal.shape[:2]

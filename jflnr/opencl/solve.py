@@ -10,10 +10,9 @@ from jflnr.regression.solve import regularisation
 def solve(
     context: Context, moments: Any, shift: Any, method: FLR, guides: int, channels: int
 ) -> Any:
-    """Coefficients of the local affine models, one per block (Appendix, Eq. 12-23).
+    """`jflnr.regression.solve.solve` of `(K, h, pitch)`, to `(Q + 1, C, h, pitch)`.
 
-    moments: `(K, h, pitch)`, blurred. shift: `(max(Q, 1),)`. guides, channels: the numbers Q, C.
-    Returns `(Q + 1, C, h, pitch)`: the value of Y at X = shift, then the slope of each guide.
+    guides, channels: the numbers Q and C.
     """
     h, pitch = moments.shape[1:]
     width = context.width()
