@@ -13,12 +13,13 @@
 // them one by one, which is what happens at the border and with an even stride.
 
 #define NUMBERS LANES(mask, LANE_NUMBER)
-#define BLEND(k)                                                                          \
+#define BLEND(next, k)                                                                    \
     if ((k) < stride)                                                                     \
-        all = (NUMBERS + (WIDTH * ((k) + stride) - channel)) % stride == 0 ? NEXT(k) : all;
-#define BLEND_ALL                                                                             \
-    BLEND(1) BLEND(2) BLEND(3) BLEND(4) BLEND(5) BLEND(6) BLEND(7) BLEND(8) BLEND(9) BLEND(10) \
-        BLEND(11) BLEND(12) BLEND(13) BLEND(14) BLEND(15)
+        all = (NUMBERS + (WIDTH * ((k) + stride) - channel)) % stride == 0 ? next(k) : all;
+#define BLEND_ALL(next)                                                                 \
+    BLEND(next, 1) BLEND(next, 2) BLEND(next, 3) BLEND(next, 4) BLEND(next, 5)          \
+    BLEND(next, 6) BLEND(next, 7) BLEND(next, 8) BLEND(next, 9) BLEND(next, 10)         \
+    BLEND(next, 11) BLEND(next, 12) BLEND(next, 13) BLEND(next, 14) BLEND(next, 15)
 #define IN_ORDER(i) LANE(all, (stride * (i) + channel) % WIDTH)
 #define ONE_BY_ONE(i) p[CLAMP(i, first, last) * stride + channel]
 
@@ -33,53 +34,35 @@ INLINE real from_half(bits h)
 #define CONSECUTIVE_HALF(i) next[i]
 INLINE bits read_half(global const ushort *next) { return LANES(bits, CONSECUTIVE_HALF); }
 
+#define NEXT_HALF(k) read_half(p + WIDTH * (k))
+#define NEXT_FLOAT(k) READ(p + WIDTH * (k))
+
 // target_lanes and guide_lanes: pixels p + first to p + last of a channel of an image; the other
 // lanes repeat the nearest one of these. p points to the first channel of lane 0.
+#define LANES_OF_IMAGE(name, stored, vector, to_real, next)                                \
+    INLINE real name(global const stored *p, int stride, int channel, int first, int last) \
+    {                                                                                      \
+        vector all;                                                                        \
+        if (first > 0 || last < WIDTH - 1 || stride % 2 == 0)                              \
+            return to_real(LANES(vector, ONE_BY_ONE));                                     \
+        all = next(0);                                                                     \
+        BLEND_ALL(next)                                                                    \
+        return to_real(LANES(vector, IN_ORDER));                                           \
+    }
 #ifdef HALF_TARGET
 typedef ushort target_t;
-typedef bits target_vector;
-#define TO_REAL from_half
-#define NEXT(k) read_half(p + WIDTH * (k))
+LANES_OF_IMAGE(target_lanes, target_t, bits, from_half, NEXT_HALF)
 #else
 typedef float target_t;
-typedef real target_vector;
-#define TO_REAL
-#define NEXT(k) READ(p + WIDTH * (k))
+LANES_OF_IMAGE(target_lanes, target_t, real, , NEXT_FLOAT)
 #endif
-INLINE real target_lanes(
-    global const target_t *p, int stride, int channel, int first, int last)
-{
-    target_vector all;
-    if (first > 0 || last < WIDTH - 1 || stride % 2 == 0)
-        return TO_REAL(LANES(target_vector, ONE_BY_ONE));
-    all = NEXT(0);
-    BLEND_ALL
-    return TO_REAL(LANES(target_vector, IN_ORDER));
-}
-#undef TO_REAL
-#undef NEXT
-
 #ifdef HALF_GUIDES
 typedef ushort guide_t;
-typedef bits guide_vector;
-#define TO_REAL from_half
-#define NEXT(k) read_half(p + WIDTH * (k))
+LANES_OF_IMAGE(guide_lanes, guide_t, bits, from_half, NEXT_HALF)
 #else
 typedef float guide_t;
-typedef real guide_vector;
-#define TO_REAL
-#define NEXT(k) READ(p + WIDTH * (k))
+LANES_OF_IMAGE(guide_lanes, guide_t, real, , NEXT_FLOAT)
 #endif
-INLINE real guide_lanes(
-    global const guide_t *p, int stride, int channel, int first, int last)
-{
-    guide_vector all;
-    if (first > 0 || last < WIDTH - 1 || stride % 2 == 0)
-        return TO_REAL(LANES(guide_vector, ONE_BY_ONE));
-    all = NEXT(0);
-    BLEND_ALL
-    return TO_REAL(LANES(guide_vector, IN_ORDER));
-}
 
 // The images that the guides lie in, as kernel arguments and handed on.
 #define GUIDE_PARAMETERS                                            \
