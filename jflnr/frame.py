@@ -81,7 +81,7 @@ def read_frame(path: exr.PathLike, spp: int = 1, layers: Mapping[str, str] | Non
 
 def frame_of(source: layouts.Source) -> Frame:
     """The frame in a file that `layouts.load` read; raises as `read_frame` does."""
-    return Frame(**layouts.assemble(source))  # type: ignore[arg-type]
+    return Frame(**layouts.assemble(source))
 
 
 def read_header(path: exr.PathLike) -> dict:

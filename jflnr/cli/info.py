@@ -105,7 +105,7 @@ def _use(source: layouts.Source) -> dict[str, Any]:
     from jflnr.frame import Frame
     from jflnr.images.inputs import guides_of
 
-    frame = Frame(**images)  # type: ignore[arg-type]
+    frame = Frame(**images)
     method = default_of(frame)
     whole = method in PICTURES
     pixels, why = layouts.denoised(images, whole)

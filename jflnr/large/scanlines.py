@@ -104,7 +104,6 @@ class Scanlines:
             stop = min(start + BATCH + AROUND, self.height)
             images = layouts.assemble(self._part(start, stop, SHOWING, nothing))
             normal, albedo, alpha = (images[name] for name in SHOWING)
-            assert normal is not None and albedo is not None
             found.append(shares_of(normal, albedo, alpha, BATCH))
         turned, others = zip(*found, strict=True)
         return np.concatenate(turned), np.concatenate(others)

@@ -1,5 +1,7 @@
 """From a file's channels and its layout to the layers of a Frame."""
 
+from typing import Any
+
 import numpy as np
 
 from jflnr.camera import Camera
@@ -11,7 +13,8 @@ from jflnr.layouts.samples import samples_of
 from jflnr.layouts.source import Source
 from jflnr.layouts.surface import SKY
 
-Layers = dict[str, np.ndarray | None]
+# Arrays, or None for a layer that is absent.
+Layers = dict[str, Any]
 
 # What no frame can do without; where a picture has no depth, it is 1 wherever there is a normal.
 GUIDES = ("albedo", "normal", "depth")
@@ -82,7 +85,6 @@ def _separated(images: Layers) -> Layers:
     it does where one of its layers is NaN or infinite; such an albedo stays, to be counted.
     """
     depth, albedo, beauty = images["depth"], images["albedo"], images.get("beauty")
-    assert depth is not None and albedo is not None
     others = (images[name] for name in ("albedo", "normal", "direct", "emission"))
     known = [_finite(image) for image in others if image is not None]
     known = np.logical_and.reduce([*known, ~np.isnan(depth)])
@@ -94,12 +96,8 @@ def _separated(images: Layers) -> Layers:
     mask = np.where(known, mask, 0)
     given, albedo = albedo, np.where(mask > 0, albedo, 0)
     if indirect is None:
-        radiance = images.get("radiance")
-        radiance = beauty if radiance is None else radiance
-        assert radiance is not None
-        if emission is not None:
-            radiance = radiance - emission
-        indirect = demodulate(radiance, albedo)
+        radiance: Any = images.get("radiance", beauty)
+        indirect = demodulate(radiance - (0 if emission is None else emission), albedo)
     if beauty is not None:
         direct = images["direct"]
         emission = rest(beauty, albedo, indirect if direct is None else direct + indirect)
@@ -119,14 +117,12 @@ def _picture(images: Layers, given: Layers, source: Source) -> Layers:
     transparent. given: the layers before the picture was separated.
     """
     beauty, environment, alpha = (images[name] for name in ("beauty", "environment", "alpha"))
-    assert beauty is not None
     if alpha is not None and (np.all(alpha == 1) if source.opaque is None else source.opaque):
         alpha = None
     if environment is None and alpha is None:
         environment = np.where(images["depth"] == 0, beauty, np.zeros_like(beauty))
     seen, albedo, normal = images["seen_albedo"], given["albedo"], images["normal"]
     depth, number = images["depth"], images["samples"]
-    assert albedo is not None and normal is not None and depth is not None
     if seen is None:
         # What mirrors and glass reflect, which have no diffuse albedo, is divided by 1.
         bare = (albedo <= DARK).all(axis=-1, keepdims=True) & (depth > 0)

@@ -275,7 +275,6 @@ def _images(
     frame: Frame, scene: Scene, filtered: Callable[..., Any] | None, others: Callable[..., Parts]
 ) -> Parts:
     picture = picture_in(frame, scene)
-    assert scene.averaged is not None and scene.light is not None and scene.lit is not None
     clean = cleaned(picture, scene.light, frame.samples, scene.averaged, filtered)
     images = images_of(picture, clean, scene.light, scene.lit)
     return images | {"lobes": frame.lobes} | others(frame, scene, images["guides"])
