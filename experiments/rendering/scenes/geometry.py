@@ -187,16 +187,3 @@ def tube(path: ArrayLike, radius: ArrayLike, segments: int = 16) -> Mesh:
     ring = np.cos(angle) * side + np.sin(angle) * np.cross(side, tangent)
     r = np.broadcast_to(np.asarray(radius, float), len(p))[:, None]
     return sheet((p + r * ring).transpose(1, 0, 2))
-
-
-def prism(outline: ArrayLike, depth: float) -> Mesh:
-    """A star-shaped outline `(N, 2)` in x, y, anticlockwise, drawn out along z by `depth`."""
-    p = np.asarray(outline, float)
-    ring = np.concatenate([p, p[:1]])
-    front = np.c_[ring, np.full(len(ring), depth)]
-    back = np.c_[ring, np.zeros(len(ring))]
-    side = sheet(np.stack([back, front]), smooth=False).flipped()
-    centre = np.tile([*p.mean(0), depth], (len(ring), 1))
-    cap = sheet(np.stack([centre, front]), smooth=False)
-    other = cap.moved([0, 0, -depth]).flipped()
-    return join([side, cap, other])
