@@ -16,8 +16,8 @@ def pytest_configure(config: pytest.Config) -> None:
     # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
     config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
     # Tests wait for the compiler, not for what it makes; so do the processes that they start.
-    flags = os.environ.get("XLA_FLAGS", "")
-    os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_optimization_level=0"
+    quick = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}"
     # Many tests need the same programs, and those of FLNR take a minute to compile: workers and
     # later runs take them from a folder. Processes that tests start find it in their environment.
     kept = Path(__file__).parents[1] / "cache" / "programs"
