@@ -27,7 +27,7 @@ from jflnr.temporal.reproject import Surface, find_taps, own_turn
 # on by the squared turn of their surface: what falls on it depends on where it faces.
 TURNED = 2.0, 30.0
 # How wrong a model is, in variances of one frame, however many frames its pixels hold.
-MODEL = 0.5
+MODEL = 0.3
 
 
 class Temporal(NamedTuple):
