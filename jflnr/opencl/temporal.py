@@ -85,12 +85,13 @@ def step(
     averaged: Any = light.mean
     context.finish(result, result)
     state = State(surface, light, kept, image, evidence)
+    if not any(stage.composes for stage in method.stages()):
+        return state, result if on_device else result.get()
     averages = {"target": averaged.get(), "weight": weight.get(), "image": result.get()}
     averages |= {"error": fitted["error"].get()} if "error" in fitted else {}
-    if "image" in (shown := compose(method, given | averages, twins.known_on(context))):
-        picture = np.asarray(shown["image"])
-        return state, context.array(picture) if on_device else picture
-    return state, result if on_device else result.get()
+    shown = compose(method, given | averages, twins.known_on(context))
+    picture = np.asarray(shown["image"])
+    return state, context.array(picture) if on_device else picture
 
 
 def reproject(

@@ -26,7 +26,7 @@ kernel void accumulate_light(
     real samples = 0;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const real known = at(before_count, 1, 0, taps.pixel[i]);
+        const real known = at(before_count, 1, 0, taps.pixel[i], taps.together[i]);
         const mask accept = (known > 0) & (taps.weight[i] > 0);
         taps.weight[i] = accept ? taps.weight[i] : (real)0;
         accepts |= accept ? (mask)(1 << i) : (mask)0;

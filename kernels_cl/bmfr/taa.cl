@@ -55,7 +55,7 @@ kernel void taa(
     Taps taps = find_taps(motion_x, motion_y, x, y, width, height);
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const real known = at(before_count, 1, 0, taps.pixel[i]);
+        const real known = at(before_count, 1, 0, taps.pixel[i], taps.together[i]);
         taps.weight[i] = known > 0 ? taps.weight[i] : (real)0;
     }
     const mask was_there = was_inside & (normalise(&taps) > 0);

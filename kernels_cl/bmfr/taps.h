@@ -6,11 +6,19 @@
 
 #define FIRST_PIXEL(width) MIN((int)get_global_id(0) * WIDTH, (width) - WIDTH)
 // Channel c of a frame's own pixels, and channel c at any pixels (a `mask` of whole numbers).
+// together: whether these are neighbours in a row, which are read as vectors.
 #define OWN(image, stride, c) target_lanes((image) + pixel * (stride), stride, c, 0, WIDTH - 1)
 #define ONE_OF(i) image[LANE(pixels, i) * stride + c]
-INLINE real at(global const float *image, int stride, int c, mask pixels)
+INLINE real at(global const float *image, int stride, int c, mask pixels, int together)
 {
+    if (together)
+        return target_lanes(image + (long)LANE(pixels, 0) * stride, stride, c, 0, WIDTH - 1);
     return LANES(real, ONE_OF);
+}
+INLINE int are_together(mask pixels)
+{
+    const mask apart = pixels - LANE(pixels, 0) - NUMBERS;
+    return WIDTH > 1 && lane_sum(apart == 0 ? (real)0 : (real)1) == 0;
 }
 
 // Exact below 2^22.
@@ -32,6 +40,7 @@ INLINE mask to_whole(real v) { return AS_WHOLE(v + MAGIC) - 0x4b400000; }
 typedef struct {
     mask pixel[4];
     real weight[4];
+    int together[4];
 } Taps;
 
 INLINE Taps find_taps(real motion_x, real motion_y, int x0, int y, int width, int height)
@@ -53,6 +62,7 @@ INLINE Taps find_taps(real motion_x, real motion_y, int x0, int y, int width, in
         const mask pixel = to_whole(tap_y) * width + to_whole(tap_x);
         taps.weight[i] = inside ? share : (real)0;
         taps.pixel[i] = inside ? pixel : (mask)0;
+        taps.together[i] = are_together(taps.pixel[i]);
     }
     return taps;
 }
@@ -73,7 +83,7 @@ INLINE real gather(global const float *image, int stride, int c, const Taps *tap
     real mean = 0;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const real part = taps->weight[i] * at(image, stride, c, taps->pixel[i]);
+        const real part = taps->weight[i] * at(image, stride, c, taps->pixel[i], taps->together[i]);
         mean += taps->weight[i] > 0 ? part : (real)0;
     }
     return mean;

@@ -11,15 +11,16 @@ typedef struct {
 
 // Of the pixels of a frame, or of any pixels.
 INLINE Surface surface_at(
-    global const float *normal, global const float *depth, global const float *position, mask pixels)
+    global const float *normal, global const float *depth, global const float *position, mask pixels,
+    int together)
 {
     Surface found;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-        found.normal[c] = at(normal, 3, c, pixels);
-        found.position[c] = at(position, 3, c, pixels);
+        found.normal[c] = at(normal, 3, c, pixels, together);
+        found.position[c] = at(position, 3, c, pixels, together);
     }
-    found.depth = at(depth, 1, 0, pixels);
+    found.depth = at(depth, 1, 0, pixels, together);
     return found;
 }
 
@@ -73,8 +74,8 @@ INLINE Taps surface_taps(int x, int y, int width, int height, SURFACE_PARAMETERS
     const real tolerance = (off_plane + moved) * here.depth;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-        const Surface there =
-            surface_at(before_normal, before_depth, before_position, taps.pixel[i]);
+        const Surface there = surface_at(
+            before_normal, before_depth, before_position, taps.pixel[i], taps.together[i]);
         const mask accept = alike(here, there, tolerance, same_normal);
         taps.weight[i] = accept ? taps.weight[i] : (real)0;
     }
