@@ -17,6 +17,7 @@ from jflnr.opencl.moments import guide_arguments, guide_defines, run_on_rows
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
+from jflnr.temporal.newly_seen import AROUND, BRIGHTER, NEAR
 from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
 from jflnr.temporal.sequence import MODEL, PAST, TURNED, State, Temporal, guide_count, prepared
 
@@ -76,11 +77,12 @@ def step(
     )  # fmt: skip
     least = temporal.light, temporal.image
     light, weight, kept = accumulate(
-        context, light, change, sample, covered, least[0], kept, layers
+        context, light, kept, layers, change, sample, covered, least[0]
     )
     images = {"target": light.mean, "guides": kept, "guides_map": layers, "weight": weight}
     fitted = twins.regress(method, images, context, to_picture=False, on_device=True)
-    image, *_ = accumulate(context, image, change, fitted["image"], covered, least[1])
+    fit, new = fitted["image"], (known, weight, surface.depth)
+    image, *_ = accumulate(context, image, None, (), change, fit, covered, least[1], new)
     result: Any = image.mean
     averaged: Any = light.mean
     context.finish(result, result)
@@ -124,27 +126,32 @@ def reproject(
 def accumulate(
     context: Context,
     before: Average,
+    kept: Any | None,
+    guides: tuple[Any, ...],
     change: Change,
     image: Any,
     covered: Any,
     least: float,
-    kept: Any | None = None,
-    guides: tuple[Any, ...] = (),
+    new: tuple[Any, ...] = (None, None, None),
 ) -> tuple[Average, Any, Any]:
     """An average that follows the change, with `image` in it; what its pixels weigh in a fit,
     `(H, W)`; and the average `kept`, `(H, W, Q)`, with `guides`.
 
     image: `(H, W, 3)`. covered: `(H, W, 1)`, what they weigh besides. least: share of the image.
+    new: what `bounded` of jflnr/temporal/newly_seen.py takes besides the image, if it is to be.
     """
     height, width = image.shape[:2]
     average, weight = _new_average(context, height, width), context.empty((height, width))
     mean = None if kept is None else context.empty(kept.shape)
     lanes = context.width() if height * width >= context.width() else 1
     arguments = (
-        height * width, least, change.unit, *before, change.signal, change.noise, image, covered,
-        kept, *guide_arguments(guides), *average, weight, mean,
+        height * width, width, least, change.unit, *before, change.signal, change.noise, image,
+        covered, kept, *guide_arguments(guides), *new, *average, weight, mean,
     )  # fmt: skip
     defines: dict[str, Any] = {"WIDTH": lanes, "MODEL": f"{MODEL}f"} | guide_defines(guides, 3)
+    if new[0] is not None:
+        bounds = {"AROUND": AROUND, "NEAR": f"{NEAR}f", "BRIGHTER": f"{BRIGHTER}f"}
+        defines |= bounds | brightness_defines(3)
     size, file = (-(-height * width // lanes),), "temporal/accumulate.cl"
     context.run("accumulate", file, defines, size, arguments)
     return average, weight, mean

@@ -21,6 +21,7 @@ from jflnr.regression.arguments import channel_count, layers_of
 from jflnr.stages import compose, regress
 from jflnr.temporal.accumulate import Average, accumulate, less_sure, nothing, reproject
 from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
+from jflnr.temporal.newly_seen import bounded
 from jflnr.temporal.reproject import Surface, find_taps, own_turn
 
 # Variances of one frame that the averaged light and the averaged result, which has less noise, take
@@ -169,7 +170,8 @@ def _step(
     images |= {"target": light.mean[..., :channels], "weight": weight}
     mapped = {"guides": light.mean[..., channels:], "guides_map": images["guides"]}
     fitted = regress(method, images | mapped, composed=False)
-    image = accumulate(_changed(image, change), fitted["image"], temporal.image)
+    fit = bounded(fitted["image"], known & covered, weight, surface.depth)
+    image = accumulate(_changed(image, change), fit, temporal.image)
     shown = compose(method, images | fitted | {"image": image.mean})
     light, kept = Average(images["target"], light.samples), mapped["guides"]
     return light, kept, image, evidence, shown.get("image")
