@@ -128,7 +128,8 @@ def own_turn(taps: Taps, here: Surface, before: Surface) -> jax.Array:
         pixel = jnp.asarray(here.depth) / here.depth.shape[1]
         moved = divide(change(here.position, before.position), pixel**2)
         turn *= jnp.clip(4 * moved - 1, 0, 3) / 3
-    return jnp.where(taps.seen & jnp.isfinite(turn), turn, 0)
+    # Unit vectors are no farther apart; what says it is a normal may be any number.
+    return jnp.where(taps.seen & jnp.isfinite(turn), jnp.minimum(turn, 4), 0)
 
 
 def _take(image: Array, pixel: jax.Array) -> jax.Array:

@@ -42,7 +42,7 @@ INLINE real own_turn(const Taps *taps, long pixel, int width, SURFACE_PARAMETERS
     const real one = READ(depth + pixel) / width, gone = change(position, before_position, taps, pixel);
     turn *= CLAMP(4 * gone / (one * one) - 1, (real)0, (real)3) / 3;
 #endif
-    return 0 * turn == 0 ? turn : (real)0;
+    return 0 * turn == 0 ? MIN(turn, (real)4) : (real)0;
 }
 
 // Global size (W / WIDTH, H). Guides (H, W, Q), averaged with the light; means, normals and positions
