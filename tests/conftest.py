@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from jflnr.frame import Frame, write_frame
+from jflnr.methods import BACKENDS
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -87,6 +88,14 @@ def frame() -> Frame:
             for name, layer in layers.items()
         }
     )
+
+
+@pytest.fixture(params=BACKENDS)
+def backend(request: pytest.FixtureRequest) -> str:
+    """Each of them that is installed."""
+    if request.param == "opencl":
+        pytest.importorskip("pyopencl")
+    return request.param
 
 
 @pytest.fixture

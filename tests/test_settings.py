@@ -19,12 +19,9 @@ SETTINGS = {
 METHODS = ("flr", "flr-adaptive", "bmfr")
 
 
-@pytest.mark.parametrize("backend", jflnr.BACKENDS)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("order", [">f4", ">f2", "<f8", ">f8"])
 def test_other_arrays(frame: Frame, method: str, backend: str, order: str) -> None:
-    if backend == "opencl":
-        pytest.importorskip("pyopencl")
     half = jax.tree.map(lambda layer: np.asarray(layer, np.float16), frame)
     right = jax.tree.map(lambda layer: layer.astype(order[1:].replace("8", "4")), half)
     other = jax.tree.map(lambda layer: layer.astype(order), half)
@@ -34,12 +31,9 @@ def test_other_arrays(frame: Frame, method: str, backend: str, order: str) -> No
     assert found.dtype == np.float32
 
 
-@pytest.mark.parametrize("backend", jflnr.BACKENDS)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("strict", [*SETTINGS, "all"])
 def test_strict_settings(frame: Frame, method: str, backend: str, strict: str) -> None:
-    if backend == "opencl":
-        pytest.importorskip("pyopencl")
     frame = dataclasses.replace(frame, motion=np.zeros_like(frame.motion))
 
     def results() -> list[np.ndarray]:

@@ -102,7 +102,6 @@ def test_info_counts_the_pixels_to_denoise(
     assert use["pixels"] == channels["depth.Z"].size - 3 * channels["depth.Z"].shape[1]
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize(
     ("method", "layer", "told"),
     [
@@ -122,8 +121,6 @@ def test_what_is_no_number_passes_through(
     backend: str,
     capsys: pytest.CaptureFixture,
 ) -> None:
-    if backend == "opencl":
-        pytest.importorskip("pyopencl")
     channels = picture_of(frame)
     channels |= {f"emission.{c}": 0 * channels["R"] for c in "RGB" if "emission" in layer}
     channels[layer][4:6, 5:10] = value

@@ -205,7 +205,6 @@ def test_the_device_takes_pixels_that_are_not_finite_without_a_word(cutout: Fram
     np.testing.assert_allclose(found, right, atol=2e-3 * right.max())
 
 
-@pytest.mark.parametrize("backend", ["jax", "opencl"])
 @pytest.mark.parametrize(
     ("name", "value"),
     [("emitted", np.nan), ("emitted", np.inf), ("seen_albedo", np.nan), ("alpha", np.nan)],
@@ -214,8 +213,6 @@ def test_what_is_nowhere_near_a_number_passes_through(
     cutout: Frame, name: str, value: float, backend: str
 ) -> None:
     """Where so much of a layer is missing that the filter fills nothing in; the passes too."""
-    if backend == "opencl":
-        pytest.importorskip("pyopencl")
     frame = dataclasses.replace(cutout, beauty=cutout.beauty + 0.5, emitted=cutout.emitted + 0.5)
     layer = np.array(getattr(frame, name))
     layer[2:32, 10:50] = value
@@ -229,12 +226,9 @@ def test_what_is_nowhere_near_a_number_passes_through(
     assert np.isfinite(picture[:, 56:]).all() and np.isfinite(passes[:, 56:]).all()
 
 
-@pytest.mark.parametrize("backend", ["jax", "opencl"])
 def test_an_infinity_of_one_pixel_says_nothing_of_the_picture(
     cutout: Frame, clean: tuple, backend: str
 ) -> None:
-    if backend == "opencl":
-        pytest.importorskip("pyopencl")
     emitted = np.array(cutout.emitted)
     emitted[2, 3] = np.inf
     image = jflnr.denoise(dataclasses.replace(cutout, emitted=emitted), FEW, backend=backend)
@@ -249,12 +243,9 @@ def test_the_device_needs_no_jax(source: Path, tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1] == "False", done
 
 
-@pytest.mark.parametrize("backend", ["jax", "opencl"])
 def test_the_first_frame_of_a_shot_is_the_frame_alone(
     cutout: Frame, clean: tuple, backend: str
 ) -> None:
-    if backend == "opencl":
-        pytest.importorskip("pyopencl")
     still = dataclasses.replace(cutout, motion=np.zeros((36, 64, 2), np.float32))
     denoiser = jflnr.Denoiser(FEW, backend=backend)
     first = denoiser.next(still)
