@@ -22,7 +22,7 @@ else:
 
         def __getattr__(self, attribute: str) -> Any:
             if self.name != "jax":  # which has settings too
-                check_not_forked("JAX", RuntimeError)
+                check_not_forked("JAX")
             return getattr(importlib.import_module(self.name), attribute)
 
     jax, jnp, lax = _Lazy("jax"), _Lazy("jax.numpy"), _Lazy("jax.lax")
@@ -44,7 +44,7 @@ def _first_user(what: str) -> int:
     return os.getpid()
 
 
-def check_not_forked(what: str, error: type[Exception]) -> None:
+def check_not_forked(what: str, error: type[ImportError] = ImportError) -> None:
     """Raise the error where a process was forked that had used what has threads of its own."""
     if _first_user(what) != os.getpid():
         raise error(

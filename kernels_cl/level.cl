@@ -183,7 +183,9 @@ kernel void fit(
 #pragma unroll
     for (int c = 0; c < C; ++c) luminance += BRIGHTNESS(c) * xy[c];
     luminance = MAX(luminance, 0);
-    real ridge = noise_ridge * variance / (luminance * luminance + 0.01f * mean[0] * mean[0]);
+    // The mean's square may be beyond float32.
+    const float dim = 0.01f * mean[0] * mean[0] + 1e-30f;
+    real ridge = noise_ridge * variance / (luminance * luminance + dim);
     ridge = MIN(ridge, 1);
 
     real coefficients[(G + 1) * C], zero = 0;  // stays 0 unless a coefficient is not finite

@@ -43,7 +43,7 @@ kernel void signal(
     }
     const real more = READ(fine + VARIANCE * GROUP) - doubled(&at, VARIANCE);
     const real luminance = READ(features + (Q + 1) * GROUP);
-    const real reference = luminance * luminance + 0.01f * mean[0] * mean[0];
+    const real reference = luminance * luminance + 0.01f * mean[0] * mean[0] + 1e-30f;
     const mask there = READ(moments + AT(x, y, pitch, K + 1)) > 1e-12f;
     WRITE(there ? d * d / reference : (real)0, signal);
     WRITE(there ? MAX(more, 0) / reference : (real)0, signal + GROUP);

@@ -8,7 +8,7 @@ What one frame leaves to the next is a `History`, so that `jax.lax.scan` goes ov
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +24,8 @@ from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
 
 # Below this albedo the light cannot be told from the picture.
 DARK = 1e-3
+# What is not below this is no albedo, but garbage, and must not stay in the history.
+WHITEST = 1e9
 # What a byte holds; by then a new sample's share has long been its least.
 MOST_SAMPLES = 255
 
@@ -118,7 +120,8 @@ def step(history: History, frame: Frame, method: BMFR = PAPER) -> tuple[History,
     )
     fitted = accumulate_fitted(taps, history, fitted, count, method.fitted_share)
     known = history.samples > 0
-    albedo: Any = frame.albedo
+    albedo = jnp.asarray(frame.albedo)
+    albedo = jnp.where(jnp.abs(albedo) < WHITEST, albedo, 0)
     picture = smooth(albedo * fitted, history.picture, known, moved, method.picture_share)
     bright = inside & (albedo > DARK)
     image = jnp.where(bright, divide(picture, albedo, DARK), fitted)

@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 
 from jflnr.bmfr import pipeline
-from jflnr.bmfr.pipeline import BMFR, DARK, PAPER, History
+from jflnr.bmfr.pipeline import BMFR, DARK, PAPER, WHITEST, History
 from jflnr.checks import one_sentence
 from jflnr.frame import Frame
 from jflnr.opencl.arguments import to_device, to_output
 from jflnr.opencl.bmfr_fit import fit
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import guide_defines, run_on_rows
-from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
+from jflnr.temporal.reproject import COSINE, OFF_PLANE, SAME_NORMAL, Surface
 
 
 def start(frame: Frame, context: Context | None = None) -> History:
@@ -78,7 +78,7 @@ def accumulate_light(
     accepted = context.empty((height, width), np.uint8)
     before = history.surface
     arguments = (
-        OFF_PLANE, SAME_NORMAL, layers["motion"], layers["normal"], layers["depth"],
+        OFF_PLANE, SAME_NORMAL, COSINE, layers["motion"], layers["normal"], layers["depth"],
         layers["position"], before.normal, before.depth, before.position, method.light_share,
         layers["sample"], layers["surface"], history.samples, history.light, light, count, accepted,
     )  # fmt: skip
@@ -103,7 +103,7 @@ def accumulate_fitted(
         method.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
         history.fitted, mean, picture,
     )  # fmt: skip
-    run(context, "accumulate_fitted", layers, arguments)
+    run(context, "accumulate_fitted", layers, arguments, {"WHITEST": WHITEST})
     return mean, picture
 
 
@@ -122,7 +122,7 @@ def taa(
         method.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
         layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
-    run(context, "taa", layers, arguments)
+    run(context, "taa", layers, arguments, {"WHITEST": WHITEST})
     return smooth
 
 
@@ -131,7 +131,7 @@ def run(
     name: str,
     layers: dict[str, Any],
     arguments: tuple[Any, ...],
-    defines: dict[str, int] | None = None,
+    defines: dict[str, Any] | None = None,
 ) -> None:
     """Enqueue kernels_cl/bmfr/`name`.cl on all pixels."""
     height, width = layers["motion"].shape[:2]

@@ -18,7 +18,7 @@ from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.stages import compose
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.newly_seen import AROUND, BRIGHTER, NEAR
-from jflnr.temporal.reproject import OFF_PLANE, SAME_NORMAL, Surface
+from jflnr.temporal.reproject import COSINE, OFF_PLANE, SAME_NORMAL, Surface
 from jflnr.temporal.sequence import MODEL, PAST, TURNED, State, Temporal, guide_count, prepared
 
 
@@ -113,8 +113,8 @@ def reproject(
     # Surfaces without a position are told apart by depth; what stands in its place is not used.
     places = [s.normal if depths else s.position for s in (surface, before)]
     arguments = (
-        width, height, OFF_PLANE, SAME_NORMAL, motion, surface.normal, surface.depth, places[0],
-        before.normal, before.depth, places[1], *TURNED, covered, *state.light,
+        width, height, OFF_PLANE, SAME_NORMAL, COSINE, motion, surface.normal, surface.depth,
+        places[0], before.normal, before.depth, places[1], *TURNED, covered, *state.light,
         state.guides, *state.image, *light, kept, *image, expected, known,
     )  # fmt: skip
     defines = guide_defines((state.guides,), 3) | brightness_defines(3)

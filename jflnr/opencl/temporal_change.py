@@ -14,7 +14,7 @@ from jflnr.opencl.level import Level, fit_level
 from jflnr.opencl.moments import centre, collect, guide_defines, run_on_rows
 from jflnr.regression.adaptive import DEFAULT
 from jflnr.regression.moments import plane_count
-from jflnr.temporal.change import BLOCK, DIM, FOLLOWED, NEWEST, NOVELTY, UNCOVERED
+from jflnr.temporal.change import BLOCK, BRIGHTEST, DIM, FOLLOWED, NEWEST, NOVELTY, UNCOVERED
 
 NUMBERS = DEFAULT
 # Planes that are averaged over the windows, see change.cl.
@@ -79,9 +79,8 @@ def _difference(
     context.run("unit_rows", file, defines, (height,), (width, height, expected, known, rows))
     context.run("unit", file, defines, (1,), (height, rows, unit))
     target, weight = context.empty((height, width, 5)), context.empty((height, width))
-    arguments = (
-        width, height, NUMBERS.offset, sample, light, expected, known, unit, target, weight
-    )  # fmt: skip
+    numbers = width, height, NUMBERS.offset, BRIGHTEST
+    arguments = *numbers, sample, light, expected, known, unit, target, weight
     run_on_rows(context, "difference", file, defines, arguments)
     return target, weight, unit
 

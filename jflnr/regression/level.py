@@ -114,7 +114,8 @@ def fit_level(
     start = index_xy(0, 0, guides + positions, channels)
     colour = moments[start : start + channels] / n
     luminance = jnp.einsum("chw,c->hw", colour, brightness(channels, n.dtype))
-    relative = variance / (jnp.maximum(luminance, 0) ** 2 + 0.01 * mean**2)
+    # The mean's square may be beyond float32.
+    relative = variance / (jnp.maximum(luminance, 0) ** 2 + 0.01 * mean**2 + 1e-30)
     ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
 
     # Positions are centred on the window already, so only their own ridge is added.

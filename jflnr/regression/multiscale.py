@@ -60,7 +60,7 @@ def fit_levels(
             where = chosen(steps[-1].share, numbers.worth, *size)
             models = jnp.where(where, fine.coefficients, coarse.coefficients)
             fine = Fit(models, jnp.where(where, fine.variance, coarse.variance), fine.window)
-        reference = luminance**2 + 0.01 * mean**2
+        reference = luminance**2 + 0.01 * mean**2 + 1e-30
         share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
         merged = merged + double(share, *size) * (fine.coefficients - coarse.coefficients)
         steps.append(Step(grid, fine, coarse, share, merged))

@@ -25,6 +25,9 @@ NEWEST = 0.5
 FOLLOWED = 0.7
 # Changes count relative to the brightness, of which this share of the frame's mean is added.
 DIM = 0.3
+# What is brighter than this many times the mean counts as that bright, so that its fourth power is
+# finite.
+BRIGHTEST = 1e8
 # Frames of noise that the history takes on where the light is all new: how wrong its details are.
 NOVELTY = 10.0
 # Around what comes into view it takes on one, in full where this part of a block has come.
@@ -72,9 +75,10 @@ def find_change(
     Returns the change, and the evidence for the next frame.
     """
     numbers, shift, unit = DEFAULT, centre(guides), _mean(expected, known)
-    difference, expected = difference / unit, jnp.maximum(expected / unit, 0)
+    usable = jnp.isfinite(light_of(difference))
+    difference = jnp.clip(difference / unit, -BRIGHTEST, BRIGHTEST)
+    expected = jnp.clip(expected / unit, 0, BRIGHTEST)
     light = light_of(difference)
-    usable = jnp.isfinite(light)
     for layer in jax.tree.leaves(guides):
         usable &= jnp.all(jnp.isfinite(layer), axis=-1)
     weight = jnp.where(usable, known / (expected + numbers.offset), 0)
@@ -105,9 +109,9 @@ def _uncovered(known: jax.Array, new: jax.Array) -> jax.Array:
 
 
 def _mean(brightness: jax.Array, weight: jax.Array) -> jax.Array:
-    """Over the pixels that count; 1 where there is no light."""
-    mean = jnp.sum(brightness * weight) / jnp.maximum(jnp.sum(weight), 1e-12)
-    return jnp.where(mean > 0, mean, 1)
+    """Over the pixels that count; 1 where there is next to no light."""
+    mean = jnp.sum(brightness * (weight / jnp.maximum(jnp.sum(weight), 1e-12)))
+    return jnp.where(mean > 1e-30, mean, 1)
 
 
 def _judge(

@@ -19,8 +19,9 @@ from jflnr.regression.division import divide
 # A tap may be off the pixel's tangent plane by this share of the depth. Positions that are stored
 # as half use up to a quarter of it.
 OFF_PLANE = 0.01
-# Least cosine between the normals of two pixels of one surface.
-SAME_NORMAL = 0.8
+# Least cosine between the normals of two pixels of one surface, and most, of normals that may be
+# twice too long; what is beyond is no normal.
+SAME_NORMAL, COSINE = 0.8, 4.0
 
 
 class Surface(NamedTuple):
@@ -142,6 +143,7 @@ def _alike(here: Surface, there: Surface, tolerance: jax.Array) -> jax.Array:
         apart = (there.depth - here.depth)[..., 0]
     else:
         apart = jnp.sum(here.normal * (there.position - here.position), axis=-1)
-    turned = jnp.sum(here.normal * there.normal, axis=-1) < SAME_NORMAL
+    cosine = jnp.sum(here.normal * there.normal, axis=-1)
+    turned = (cosine < SAME_NORMAL) | (cosine > COSINE)
     hit = (here.depth > 0) & (there.depth > 0)
     return (jnp.abs(apart) <= tolerance) & ~turned & hit[..., 0]

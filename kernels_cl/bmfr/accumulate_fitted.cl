@@ -31,7 +31,7 @@ kernel void accumulate_fitted(
     for (int c = 0; c < 3; ++c) {
         mixed[c] = gather(before_mean, 3, c, &taps);
         mixed[c] += share * (OWN(fitted, 3, c) - mixed[c]);
-        colour[c] = OWN(albedo, 3, c) * mixed[c];
+        colour[c] = usable_albedo(OWN(albedo, 3, c)) * mixed[c];
     }
     write_pixels(mean + pixel * 3, mixed, 0, WIDTH - 1);
     to_ycocg(colour);

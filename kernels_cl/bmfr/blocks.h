@@ -9,11 +9,12 @@
 #define M (1 + RANGES)                // columns of T
 // Light is fitted times this, or sums over a block would leave float32 near its end.
 #define LESS 0x1p-16f
-#define ONE_BLOCK (2 * RANGES)        // in `ranges` (h, w, RANGES, 2): lowest value, and how far up
+#define ONE_BLOCK (2 * RANGES)        // in `ranges` (h, w, RANGES, 2): halves of lowest value and range
 
+// low, spread: lowest value and range, both halved, since the range of all of float32 is beyond it.
 INLINE real to_unit(real x, float low, float spread)
 {
-    return spread > 0 ? 2 * ((x - low) / spread) - 1 : (real)0;
+    return spread > 0 ? 2 * ((x / 2 - low) / spread) - 1 : (real)0;
 }
 
 // Column m of T (a constant once loops over m are unrolled). x: the guides. ranges: of the block.

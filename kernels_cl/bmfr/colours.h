@@ -15,3 +15,9 @@ INLINE void to_rgb(real *v)
     v[1] = luma + green;
     v[2] = luma - orange - green;
 }
+
+// Albedo, or 0 where it is none.
+INLINE real usable_albedo(real albedo)
+{
+    return ABS(albedo) < (float)WHITEST ? albedo : (real)0;
+}

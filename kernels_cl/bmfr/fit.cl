@@ -69,7 +69,7 @@ INLINE float lane_max(real v)
     return most;
 }
 
-// Lowest value of every scaled feature in the block, and how far up it reaches.
+// Halves of the lowest value of every scaled feature in the block, and of how far up it reaches.
 typedef struct {
     float low[RANGES], spread[RANGES];
 } Ranges;
@@ -84,9 +84,9 @@ INLINE void find_ranges(
     for (int i = 0; i < 2 * count; ++i) ends[i] = lane_max(reach[i]);
     combine(ends, 2 * count, 0, worker, partial);
     for (int i = 0; i < count; ++i) {
-        const float low = -ends[2 * i], high = ends[2 * i + 1];
+        const float low = -ends[2 * i] / 2, high = ends[2 * i + 1] / 2;
         ranges->low[first + i] = low;
-        ranges->spread[first + i] = high - low > least ? high - low : 0;
+        ranges->spread[first + i] = high - low > least / 2 ? high - low : 0;
     }
 }
 

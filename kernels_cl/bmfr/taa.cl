@@ -76,7 +76,7 @@ kernel void taa(
     const mask covered = READ(surface + pixel) > 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-        const real divisor = OWN(albedo, 3, c);
+        const real divisor = usable_albedo(OWN(albedo, 3, c));
         const real quotient = shown[c] / divisor;
         image_of[c] = (covered & (divisor > dark)) ? quotient : OWN(mean, 3, c);
     }

@@ -39,7 +39,7 @@ INLINE Surface surface_here(
 }
 
 // Whether two pixels show one surface. tolerance: in scene units.
-INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal)
+INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal, float cosine)
 {
 #ifdef DEPTHS
     const real apart = there.depth - here.depth;
@@ -48,19 +48,20 @@ INLINE mask alike(Surface here, Surface there, real tolerance, float same_normal
     for (int c = 0; c < 3; ++c) there.position[c] -= here.position[c];
     const real apart = DOT(here.normal, there.position);
 #endif
-    const mask turned = DOT(here.normal, there.normal) < same_normal;
+    const real product = DOT(here.normal, there.normal);
+    const mask turned = (product < same_normal) | (product > cosine);
     return (ABS(apart) <= tolerance) & (turned == 0) & (here.depth > 0) & (there.depth > 0);
 }
 
 // What taps follow from, as kernel arguments and handed on.
 #define SURFACE_PARAMETERS                                                        \
-    float off_plane, float same_normal, global const float *motion,               \
+    float off_plane, float same_normal, float cosine, global const float *motion, \
         global const float *normal, global const float *depth,                    \
         global const float *position, global const float *before_normal,          \
         global const float *before_depth, global const float *before_position
 #define SURFACES                                                                  \
-    off_plane, same_normal, motion, normal, depth, position, before_normal, before_depth, \
-        before_position
+    off_plane, same_normal, cosine, motion, normal, depth, position, before_normal,   \
+        before_depth, before_position
 
 // The taps of the pixels from (x, y), with weight 0 for those of other surfaces; not divided by their
 // sum.
@@ -76,7 +77,7 @@ INLINE Taps surface_taps(int x, int y, int width, int height, SURFACE_PARAMETERS
     for (int i = 0; i < 4; ++i) {
         const Surface there = surface_at(
             before_normal, before_depth, before_position, taps.pixel[i], taps.together[i]);
-        const mask accept = alike(here, there, tolerance, same_normal);
+        const mask accept = alike(here, there, tolerance, same_normal, cosine);
         taps.weight[i] = accept ? taps.weight[i] : (real)0;
     }
     return taps;
