@@ -37,7 +37,7 @@ def wanted(arguments: argparse.Namespace) -> bool:
     """Whether frames are to be denoised as shots. Raises ValueError if something excludes that."""
     if not (arguments.temporal or arguments.history is not None or arguments.method == "bmfr"):
         return False
-    for name in ("error_map", "profile", "lobes"):
+    for name in ("error_map", "explain", "profile", "lobes"):
         if getattr(arguments, name):
             raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
     if arguments.backend == "opencl" and arguments.history is not None:
