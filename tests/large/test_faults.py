@@ -36,36 +36,43 @@ def nothing(frame: Frame) -> dict[str, np.ndarray]:
     return picture_of(frame) | {"depth.Z": 0 * np.asarray(frame.depth)[..., 0]}
 
 
-KINDS = [passes, mitsuba, gbuffer, picture_of, with_alpha, with_nan, behind]
+# Of other programs, whose pictures need the whole frame in OpenCL, and of our own.
+OTHERS, OWN = [passes, mitsuba, gbuffer], [picture_of, with_alpha, with_nan, behind, nothing]
 
 
-@pytest.mark.parametrize("kind", [*KINDS, nothing], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize(
+    ("kind", "backend"),
+    [*((kind, "jax") for kind in OTHERS + OWN), *((kind, "opencl") for kind in OWN)],
+    indirect=["backend"],
+)
 def test_pieces_are_the_whole(
     tmp_path: Path,
     frame: Frame,
     kind: object,
+    backend: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture,
 ) -> None:
     path, records, outputs = tmp_path / "a.exr", [], []
     others = {"artist": "é", "gain": 2.5, "matrix": np.eye(3, dtype=np.float32)}
     exr.write_channels(path, kind(frame), '{"scene": "x"}', None, others)  # type: ignore[operator]
-    for tile in (None, 16):
+    for tile, held in ((None, True), (16, True), (16, False)):
         monkeypatch.setattr(memory, "tile_for", lambda *_, tile=tile: tile)
-        outputs.append(tmp_path / f"{tile}.exr")
-        command = ["denoise", str(path), "-o", str(outputs[-1]), "--json", "--backend", "jax"]
+        monkeypatch.setattr(memory, "holds", lambda *_, held=held: held)
+        outputs.append(tmp_path / f"{tile} {held}.exr")
+        command = ["denoise", str(path), "-o", str(outputs[-1]), "--json", "--backend", backend]
         assert main(command) == 0
         records += json.loads(capsys.readouterr().out)
-    whole, pieces = records
-    assert pieces["warnings"] == whole["warnings"]
-    assert pieces["layout"] == whole["layout"] and pieces["guides"] == whole["guides"]
-    wanted, found = map(exr.read_channels, outputs)
-    assert found.keys() == wanted.keys()
-    for name, pixels in wanted.items():
-        # Fits of 13 guides to 40 x 24 pixels make more of rounding, in a single piece too.
-        most = 2e-3 if whole["method"] == "picture" else 1e-4
-        np.testing.assert_allclose(found[name], pixels, rtol=most, atol=1e-5)
-    first, second = (exr.read_attributes(output) for output in outputs)
-    assert read_header(outputs[0]) == read_header(outputs[1])
-    assert first._replace(others={}) == second._replace(others={})
-    assert str(first.others) == str(second.others) and "artist" in second.others
+    whole, *others = records
+    right, wanted = exr.read_attributes(outputs[0]), exr.read_channels(outputs[0])
+    for record, output in zip(others, outputs[1:], strict=True):
+        assert all(record[name] == whole[name] for name in ("warnings", "layout", "guides"))
+        found, attributes = exr.read_channels(output), exr.read_attributes(output)
+        assert found.keys() == wanted.keys()
+        for name, pixels in wanted.items():
+            # Fits of 13 guides to 40 x 24 pixels make more of rounding, in a single piece too.
+            most = 2e-3 if whole["method"] == "picture" else 1e-4
+            np.testing.assert_allclose(found[name], pixels, rtol=most, atol=1e-5)
+        assert read_header(output) == read_header(outputs[0])
+        assert attributes._replace(others={}) == right._replace(others={})
+        assert str(attributes.others) == str(right.others) and "artist" in right.others
