@@ -67,8 +67,11 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     stems = {layer: _layer(view, name) for layer, name in chosen.items()}
     names = {layer: in_layer(channels, stem) or (f"{stem}.R",) for layer, stem in stems.items()}
     names |= {"motion": names["motion"][:2]} if "motion" in names else {}
+    if "indirect" in names and not set(names["beauty"]) <= set(channels):
+        del names["beauty"]  # an alpha alone
     combined = _layer(view, "Combined")
-    picture = in_layer(channels, combined) + tuple({f"{combined}.A"} & set(channels))
+    picture = in_layer(channels, combined)
+    picture += tuple({f"{combined}.A"} & set(channels)) if len(picture) == 3 else ()
     lobes = tuple(_lobes(channels, view))
     if "seen_albedo" not in names and (
         colours := [lobe.colour for lobe in lobes if any(lobe.colour)]

@@ -21,23 +21,24 @@ def output_channels(
     """What to write, from the picture (H, W, 3) and the denoised indirect light (H, W, 3) or None.
 
     alpha: (H, W, 1), that of the source if None. passes: (H, W, C), denoised, as `pass_names` names
-    them. choice: `picture`, as `R`, `G`, `B` with its
-    alpha; `light`, with the layer `indirect`, where that was denoised; `all`, also with every
-    channel of the source. Of another program's file, the picture and, where `mask` (H, W, 1) is 1,
-    the light passes are then the denoised ones: the file can stand in for the source, and its
-    passes still sum to its picture.
+    them. choice: `picture`, as `R`, `G`, `B` with its alpha; `light`, with the layer `indirect`,
+    where that was denoised, 0 where `mask` (H, W, 1) is; `all`, also with every channel of the
+    source. Of another program's file, the picture and, where `mask` is 1, the light passes are then
+    the denoised ones: the file can stand in for the source, and its passes still sum to its
+    picture.
     """
     layout = source.layout
     channels: dict[str, np.ndarray] = {}
     if choice == "all":
         channels |= source.channels
         channels |= _planes(layout.picture[:3], picture)
+    surface = True if mask is None else mask[..., 0] > 0
     if choice == "all" and layout.picture and light is not None:
-        surface = True if mask is None else mask[..., 0] > 0
         for name, plane in _planes(layout.channels.get("indirect", ()), light).items():
             channels[name] = np.where(surface, plane, source.channels[name])
     if choice != "picture" and light is not None:
-        channels |= _planes(NATIVE["indirect"], light)
+        for name, plane in _planes(NATIVE["indirect"], light).items():
+            channels[name] = np.where(surface, plane, 0)
     if passes is not None and choice != "picture":
         channels |= _planes(pass_names(layout), passes)
         channels.pop("", None)

@@ -85,6 +85,15 @@ def test_output_holds_light_picture_and_header(tmp_path: Path, frame_file: Path)
 
 
 @pytest.mark.usefixtures("stand_in")
+def test_there_is_no_light_where_there_is_no_surface(tmp_path: Path, frame: Frame) -> None:
+    mask = np.float32(np.arange(24) > 5)[:, None, None] * np.ones((24, 40, 1), np.float32)
+    write_frame(tmp_path / "in.exr", dataclasses.replace(frame, mask=mask))
+    assert run(tmp_path / "in.exr", "-o", tmp_path / "out.exr") == 0
+    light = exr.read_channels(tmp_path / "out.exr")["indirect.G"]
+    np.testing.assert_array_equal(light, 0.5 * frame.indirect[..., 1] * mask[..., 0])
+
+
+@pytest.mark.usefixtures("stand_in")
 def test_data_window_is_kept(tmp_path: Path, frame_file: Path) -> None:
     window = exr.Window(origin=(8, 2), display=(0, 0, 99, 49))
     exr.write_channels(frame_file, exr.read_channels(frame_file), window=window)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from jflnr import exr, layouts
@@ -177,6 +177,7 @@ PROGRAMS = [
 
 @settings(max_examples=300, deadline=None)
 @given(st.sampled_from(PROGRAMS), st.dictionaries(LAYER_NAMES, PARTS, max_size=5))
+@example(PROGRAMS[0], {"V.Combined": "A", "V.DiffInd": "RGB"})
 def test_any_names_give_a_frame_or_one_sentence(
     program: dict[str, str], others: dict[str, str]
 ) -> None:
