@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -235,13 +236,13 @@ def every_nth(frame: Frame, factor: int) -> Frame:
 
 
 def _upsample() -> list[Case]:
-    cases = []
-    for rays in (1, 4, 16):
-        for factor in (1, 2, 4):
-            labels = {"rays": rays, "factor": factor, "spp": rays * factor**2}
-            stored = functools.partial(traced_at, factor=factor)
-            timed = Method(f"1/{factor}", "jflnr", jflnr.denoise, {}, True, stored)
-            cases.append(Case(labels, timed, functools.partial(_of_streams, streams=(rays,)), True))
+    cases, names = [], ("flr", "flr-adaptive", "auto")
+    for name, rays, factor in itertools.product(names, (1, 4, 16), (1, 2, 4)):
+        labels = {"method": name, "rays": rays, "factor": factor}
+        stored = functools.partial(traced_at, factor=factor)
+        options = {"method": name, "backend": "opencl"}
+        timed = Method(f"{name} 1/{factor}", "jflnr", jflnr.denoise, options, False, stored)
+        cases.append(Case(labels, timed, functools.partial(_of_streams, streams=(rays,)), True))
     return cases
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from jflnr.frame import Array, Frame
-from jflnr.images.noisy_guides import antialiased, holds_light
+from jflnr.images.noisy_guides import antialiased, holds_light, smooth_guide
 
 DEFAULT = ("normal", "depth", "ao")
 NAMES = ("normal", "depth", "ao", "position", "albedo")
@@ -142,3 +142,17 @@ def shrink(image: Array, factor: int, mask: Array | None = None) -> Any:
         return x.reshape(h, factor, w, factor, c).sum((1, 3))
 
     return totals(image * weight) / xp.maximum(totals(weight), 1e-6)
+
+
+class Filters(NamedTuple):
+    """What is done to guides: `smooth_guide`, `regression.picture.filter_layers`, `shrink`.
+
+    Each of a device, or of JAX, where the second is None.
+    """
+
+    smooth: Callable[..., Any] = smooth_guide
+    layers: Callable[..., Any] | None = None
+    shrink: Callable[..., Any] = shrink
+
+
+FILTERS = Filters()

@@ -10,7 +10,7 @@ import numpy as np
 from jflnr import checks
 from jflnr.frame import Frame
 from jflnr.images import guides as guide_layers
-from jflnr.images.noisy_guides import FILTERS, Filters
+from jflnr.images.guides import FILTERS, Filters
 from jflnr.layouts import LAYERS, PICTURE
 
 
@@ -97,20 +97,9 @@ def plain_images(
 
     target: the light. guides: averaged over its pixels, if these are larger. guides_map: the guides
     that the models are evaluated on, if those are others. weight: which pixels count, or None.
-    scene: of the frame that this one is a part of; the frame's own if None. filters: not used.
+    scene: of the frame that this one is a part of; the frame's own if None. filters: of a device.
     """
-    target, mask = frame.indirect, frame.mask
-    layers = guide_layers.layers(frame, names, scene)
-    factor = factor_of(frame)
-    if factor == 1:
-        weight = None if mask is None else mask[..., 0] > 0
-        return {"target": target, "guides": layers, "guides_map": None, "weight": weight}
-    return {
-        "target": target,
-        "guides": tuple(guide_layers.shrink(layer, factor, mask) for layer in layers),
-        "guides_map": layers,
-        "weight": None if mask is None else guide_layers.shrink(mask, factor)[..., 0],
-    }
+    return _images(frame, guide_layers.layers(frame, names, scene), filters)
 
 
 def robust_images(
@@ -120,12 +109,24 @@ def robust_images(
     filters: Filters = FILTERS,
 ) -> dict[str, Any]:
     """`plain_images` with far depths drawn near and ambient occlusion without noise."""
-    images = plain_images(frame, names, scene)
-    layers = dict(zip(names, images["guides"], strict=False))
+    found = guide_layers.layers(frame, names, scene)
+    layers = dict(zip(names, found, strict=False))
     if "depth" in layers:
         layers["depth"] = guide_layers.draw_near(layers["depth"])
     if "ao" in layers:
         layers["ao"] = filters.smooth(layers["ao"], frame.normal, frame.depth)
     # Without names there is one layer of no channels.
-    images["guides"] = tuple(layers.values()) or images["guides"]
-    return images
+    return _images(frame, tuple(layers.values()) or found, filters)
+
+
+def _images(frame: Frame, layers: tuple[Any, ...], filters: Filters) -> dict[str, Any]:
+    target, mask, factor = frame.indirect, frame.mask, factor_of(frame)
+    if factor == 1:
+        weight = None if mask is None else mask[..., 0] > 0
+        return {"target": target, "guides": layers, "guides_map": None, "weight": weight}
+    return {
+        "target": target,
+        "guides": tuple(filters.shrink(layer, factor, mask) for layer in layers),
+        "guides_map": layers,
+        "weight": None if mask is None else filters.shrink(mask, factor)[..., 0],
+    }

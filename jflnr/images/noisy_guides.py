@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from jflnr.lazy import jax, jnp, lax
 
@@ -44,19 +43,6 @@ def _likeness(normal: jax.Array, depth: jax.Array, axis: int) -> jax.Array:
     nearer = jnp.minimum(*(lax.slice_in_dim(depth, k, k + size - 1, axis=axis) for k in (0, 1)))
     step = jnp.diff(depth, axis=axis) / (DEPTH * nearer + 1e-6)
     return jnp.nan_to_num(jnp.exp(-(turn / NORMAL**2 + step**2) / 2))
-
-
-class Filters(NamedTuple):
-    """What takes the noise from guides: `smooth_guide`, and `regression.picture.filter_layers`.
-
-    Each of JAX, for the latter None, or of a device.
-    """
-
-    smooth: Callable[..., Any] = smooth_guide
-    layers: Callable[..., Any] | None = None
-
-
-FILTERS = Filters()
 
 
 def antialiased(normal: Any) -> Any:

@@ -98,6 +98,8 @@ class FLNR(AdaptiveFLR):
                 f"method {self.name} needs 4 or 5 channels of guides, and light of three, or of "
                 f"groups of three; got {guides} and {channels}"
             )
+        if self.factor > 1:
+            raise ValueError(f"method {self.name} needs guides_map at the size of target")
         if self.params is not None:
             return self
         from jflnr.network.weights import shipped

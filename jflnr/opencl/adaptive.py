@@ -30,7 +30,7 @@ from jflnr.opencl.weigh import collect_blocks
 from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.parameters import numbers_of
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
-from jflnr.regression.arguments import channel_count, check_same_size
+from jflnr.regression.arguments import channel_count, check_regression, layers_of
 from jflnr.regression.auto import Auto
 
 
@@ -57,7 +57,8 @@ def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **opti
 
     target, guides and weight may be arrays of numpy or JAX, or device arrays; context, out and
     on_device: as in `jflnr.opencl.flr`.
-    Returns `(H, W, C)`, float32 unless `out` is given; `with_error` also the error, `(H, W, 1)`.
+    Returns `(H, W, C)` or `(f H, f W, C)`, float32 unless `out` is given; `with_error` also the
+    error, of one channel.
 
     Raises `ValueError` or `TypeError`, naming the argument; `NoDevice` without a device.
     """
@@ -80,17 +81,18 @@ def run_on_images(
     """What `flr_adaptive` returns. write: the result, from images and method, to a device array,
     and its error to another one or to none."""
     context = default_context() if context is None else context
-    method = dataclasses.replace(method, **options)
-    check_same_size(target, guides, guides_map, weight)
+    factor = check_regression(target, guides, guides_map, weight)
+    method = dataclasses.replace(method, **options, factor=factor)
     method = method.ready(check_guides(guides), target.shape[2])
-    output, result = to_output(context, target.shape, out, on_device)
+    size = (layers_of(guides_map) or [target])[0].shape[:2]
+    output, result = to_output(context, (*size, target.shape[2]), out, on_device)
     pixels, unit = in_unit(target)
     fitted = to_layers(context, guides)
     mapped = fitted if guides_map is None else to_layers(context, guides_map)
     images = context.array(pixels), fitted, to_weight(context, weight), mapped
     error = told = None
     if method.with_error:
-        error, told = to_output(context, (*target.shape[:2], 1), None, on_device)
+        error, told = to_output(context, (*size, 1), None, on_device)
     write(context, images, method, output, error)
     for array in (output, error):
         if unit != 1 and array is not None:
@@ -145,9 +147,9 @@ def write_light(
     steps, merged = fit_levels(run, grid, block, method.levels)
     scale, own = restore(run, merged, light, w), own_light(run, merged, grid)
     restored = Restored(*scale, own, run.numbers.floor)
-    apply(context, merged.planes, guides_map, shift, block, merged.sizes, image, restored)
+    apply(context, merged.planes, guides_map, shift, method.side, merged.sizes, image, restored)
     if error is not None:
-        standard_error(run, steps, scale, own, block, error)
+        standard_error(run, steps, scale, own, method.side, error)
     return run
 
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from jflnr.images.guides import shrink
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import Grid, Images, Run, brightness_defines
 from jflnr.opencl.moments import pixel_defines
@@ -48,15 +49,18 @@ def rescale(
 ) -> None:
     """Scale the result so that its brightness sums to the input's over the pixels that count.
 
-    image: `(H, W, C)` float32. output: `(H, W, C)`, float32 or float16, is written; it may be
-    `image`. slack: share by which it may differ. error: `(H, W, 1)` float32, is scaled likewise.
+    image: `(H, W, C)` float32, or larger by a whole factor than the input. output: of its size,
+    float32 or float16, is written; it may be `image`. slack: share by which it may differ. error:
+    `(H, W, 1)` float32, is scaled likewise.
     """
     target, _, weight, _ = images
-    height, width, channels = image.shape
+    (height, width), channels, pooled = target.shape[:2], image.shape[2], image
+    if (factor := -(-image.shape[0] // height)) > 1:
+        pooled = context.array(shrink(image.get(), factor))
     partial, ratio = context.empty((height, 2)), context.empty((1,))
     defines = pixel_defines(target, (), weight, 1) | brightness_defines(channels)
     defines["WIDTH"] = context.width()
-    arguments = (width, height, target, image, weight, partial)
+    arguments = (width, height, target, pooled, weight, partial)
     context.run("energy_rows", "rescale.cl", defines, (height,), arguments)
     context.run("energy_ratio", "rescale.cl", defines, (1,), (height, slack, partial, ratio))
     scaled = [(image, output), *([] if error is None else [(error, error)])]

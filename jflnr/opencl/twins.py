@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-from jflnr.images.noisy_guides import Filters
+from jflnr.images.guides import Filters
 from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.opencl.context import Context
 from jflnr.opencl.detail import composed
@@ -13,6 +13,7 @@ from jflnr.opencl.flnr import flnr, picture_light
 from jflnr.opencl.flr import flr
 from jflnr.opencl.network import correct_picture
 from jflnr.opencl.noisy_guides import smooth_guide
+from jflnr.opencl.shrink import shrink
 from jflnr.stages import Known, Parts, compose
 
 # By the method's type.
@@ -27,9 +28,9 @@ REGRESSIONS: dict[str, Callable[..., Any]] = {
 
 
 def filters_on(context: Context) -> Filters:
-    """What takes the noise from guides, on the device."""
-    here = (functools.partial(filter, context=context) for filter in (smooth_guide, filter_layers))
-    return Filters(*here)
+    """What is done to guides, on the device."""
+    filters = smooth_guide, filter_layers, shrink
+    return Filters(*(functools.partial(filter, context=context) for filter in filters))
 
 
 def known_on(context: Context) -> Known:

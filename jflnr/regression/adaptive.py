@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from jflnr.frame import Frame
-from jflnr.images.inputs import robust_images, same_size
+from jflnr.images.guides import shrink
+from jflnr.images.inputs import factor_of, robust_images
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.regression import energy
 from jflnr.regression.apply import apply, guides_to_map
-from jflnr.regression.arguments import channel_count, check_options, check_same_size
+from jflnr.regression.arguments import channel_count, check_options, check_regression
 from jflnr.regression.floor import with_own_light
 from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides
 from jflnr.regression.moments import (
@@ -56,8 +57,9 @@ class AdaptiveFLR:
     worth: the finest models are fitted only where of what the next coarser ones added more than
     this share is signal; everywhere if None.
     block: side in pixels of the blocks of pass 1; the finest models have half of it. levels: number
-    of grids, each twice as coarse. keep_energy: give every frame exactly the mean brightness of its
-    input, instead of nearly. with_error: tell the standard error of the result too.
+    of grids, each twice as coarse. factor: how many times larger the guides are than the light,
+    from the frame. keep_energy: give every frame exactly the mean brightness of its input, instead
+    of nearly. with_error: tell the standard error of the result too.
 
     Raises `ValueError` for a number that is not positive.
     """
@@ -82,6 +84,7 @@ class AdaptiveFLR:
     worth: jax.Array | float | None = None
     block: int = field(default=8, metadata={"static": True})
     levels: int = field(default=4, metadata={"static": True})
+    factor: int = field(default=1, metadata={"static": True})
     keep_energy: bool = field(default=False, metadata={"static": True})
     with_error: bool = field(default=False, metadata={"static": True})
 
@@ -90,8 +93,13 @@ class AdaptiveFLR:
 
     @property
     def finest(self) -> int:
-        """Pixels on a side of the finest blocks."""
+        """Pixels of the light on a side of the finest blocks."""
         return max(self.block // 2, 1)
+
+    @property
+    def side(self) -> int:
+        """Those of the guides."""
+        return self.finest * self.factor
 
     @property
     def tells_error(self) -> bool:
@@ -99,8 +107,9 @@ class AdaptiveFLR:
         return self.with_error
 
     def for_frame(self, frame: Frame, names: tuple[str, ...]) -> AdaptiveFLR:
-        same_size(frame, self.name)
-        return self
+        """With the block in pixels of the light."""
+        factor = factor_of(frame)
+        return dataclasses.replace(self, block=max(self.block // factor, 1), factor=factor)
 
     def ready(self, guides: int, channels: int) -> AdaptiveFLR:
         """With all that it needs for so many guides and channels of light."""
@@ -111,7 +120,7 @@ class AdaptiveFLR:
         return {"shift": centre(images["guides"]), "unit": unit_of(images["target"])}
 
     def stages(self) -> tuple[Stage, ...]:
-        side = self.finest
+        side = self.side
         light = Stage(
             collect_light,
             (("light", 2 * side),),
@@ -139,7 +148,7 @@ class AdaptiveFLR:
         stages = light, pilot, moments, models
         if not self.keep_energy:
             return (*stages, image)
-        image = dataclasses.replace(image, totals=(("sums", 1),), learn=learn_kept)
+        image = dataclasses.replace(image, totals=(("sums", self.factor),), learn=learn_kept)
         return (*stages, image, Stage(keep_energy, gives, image.names))
 
 
@@ -174,16 +183,18 @@ def flr_adaptive(
 
     target: `(H, W, C)`, the noisy radiance Y, not negative. guides: `(H, W, Q)`, X without the
     constant, or several such arrays. method: constants and options; options: fields of it to
-    replace. guides_map: `(H, W, Q)`, the guides that the models are evaluated on, such as those of
-    this frame where light and guides are averaged over several; None evaluates on `guides`.
+    replace. guides_map: `(f H, f W, Q)`, as of `flr`, the guides that the models are evaluated on,
+    such as those of this frame where light and guides are averaged over several; None evaluates on
+    `guides`.
     weight: `(H, W)`, numbers or a boolean mask; 0 removes a pixel, as does any value that is not
     finite.
-    Returns `(H, W, C)`; `with_error` also `(H, W, 1)`, the standard error of its brightness.
+    Returns `(H, W, C)` or `(f H, f W, C)`; `with_error` also the standard error of its brightness,
+    of one channel.
 
     Raises `ValueError` or `TypeError`, naming the argument, if shapes, types or options are wrong.
     """
-    method = dataclasses.replace(method, **options)
-    check_same_size(target, guides, guides_map, weight)
+    factor = check_regression(target, guides, guides_map, weight)
+    method = dataclasses.replace(method, **options, factor=factor)
     method = method.ready(channel_count(guides), target.shape[-1])
     images = {"target": target, "guides": guides, "guides_map": guides_map, "weight": weight}
     given = regress(method, images)
@@ -271,16 +282,17 @@ def evaluate(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """Pass 3: the light of every pixel, `(H, W, C)`, and its error."""
     models = energy.scale(parts["models"], parts["output"], known["rate"])
     shift, unit = known["shift"], known["unit"]
-    image = apply(models, guides_to_map(parts), shift, method.finest, method.floor) * unit
+    image = apply(models, guides_to_map(parts), shift, method.side, method.floor) * unit
     given = {"image": image}
     if method.keep_energy:
-        given["sums"] = before_and_after(image, parts, unit)
+        coarse = image if method.factor == 1 else shrink(image, method.factor)
+        given["sums"] = before_and_after(coarse, parts, unit)
     if method.tells_error:
         own = jnp.einsum("chw,c->hw", models[-1], brightness(models.shape[1], models.dtype))
         # The bound is there for its root's derivative, and for pixels that see no light.
         error = jnp.sqrt(parts["block_error"] + DETAIL * own**2 + 1e-6 * known["mean"] ** 2)
-        none = jnp.zeros((*parts["target"].shape[:2], 0), error.dtype)
-        given["error"] = apply(error[None, None], none, shift[:0], method.finest) * unit
+        none = jnp.zeros((*image.shape[:2], 0), error.dtype)
+        given["error"] = apply(error[None, None], none, shift[:0], method.side) * unit
     return given
 
 

@@ -54,14 +54,6 @@ def check_regression(target: Any, guides: Any, guides_map: Any | None, weight: A
     return 1 if guides_map is None else _finer_by(target, guides, guides_map)
 
 
-def check_same_size(target: Any, guides: Any, guides_map: Any | None, weight: Any | None) -> None:
-    """`check_regression` for a method whose guides have the size of the light."""
-    if check_regression(target, guides, guides_map, weight) > 1:
-        raise ValueError(
-            "this method needs guides_map at the size of target; flr takes larger ones"
-        )
-
-
 def _finer_by(target: Any, guides: Any, guides_map: Any) -> int:
     coarse = target.shape[:2]
     fine = {layer.shape[:2] for layer in layers_of(guides_map)} or {coarse}

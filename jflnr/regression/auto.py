@@ -39,10 +39,10 @@ class Auto(AdaptiveFLR):
 
     def stages(self) -> tuple[Stage, ...]:
         light, pilot, moments, *rest = super().stages()
-        blocks = "blocks", self.finest
+        blocks = "blocks", self.side
         light = dataclasses.replace(light, run=collect_blocks, gives=(*light.gives, blocks))
         reads = *moments.reads, "blocks"
-        align = 4 * self.finest
+        align = 4 * self.side
         moments = dataclasses.replace(
             moments, run=weigh_blocks, reads=reads, pixels=False, reach=2 * align, align=align
         )
@@ -61,12 +61,12 @@ def signal_in_tiles(
     """
     method = Auto() if method is None else method
     names, inputs = prepare(frame, guides, method)
-    shares = _signal(method.for_frame(inputs, names), inputs, names)
-    return np.asarray(shares), TILE * method.finest
+    own = method.for_frame(inputs, names)
+    return np.asarray(_signal(own, inputs, names)), TILE * own.side
 
 
 @functools.partial(jit, static_argnames="names")
-def _signal(method: Auto, frame: Frame, names: tuple[str, ...]) -> jax.Array:
+def _signal(method: AdaptiveFLR, frame: Frame, names: tuple[str, ...]) -> jax.Array:
     images = method.images(frame, names)
     parts, known = run(method.stages()[:3], method, images, method.known(images))
     return in_tiles(levels_of(method, parts["moments"], known)[1][-2].share)

@@ -17,9 +17,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from jflnr.frame import Array, Frame
-from jflnr.images.guides import FAR, Scene, draw_near, mean_light, scene_of
+from jflnr.images.guides import FAR, FILTERS, Filters, Scene, draw_near, mean_light, scene_of
 from jflnr.images.inputs import same_size
-from jflnr.images.noisy_guides import FILTERS, Filters, antialiased, holds_light
+from jflnr.images.noisy_guides import antialiased, holds_light
 from jflnr.lazy import jax, jit, jnp, pytree
 from jflnr.regression.adaptive import AdaptiveFLR, light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK

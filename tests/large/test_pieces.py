@@ -8,6 +8,7 @@ import pytest
 
 import jflnr
 from jflnr.frame import Frame
+from jflnr.images.guides import shrink
 from jflnr.large import memory
 from jflnr.large.pieces import pieces
 from jflnr.large.planes import Planes
@@ -99,6 +100,16 @@ def test_adaptive_flr_and_flnr_in_tiles_are_themselves(rng, method, height, widt
     assert relative(ours, whole) < RELATIVE
     # No seam: where strips and tiles meet, nothing differs more than elsewhere.
     assert np.abs(ours - whole).max() < 1e-3 * whole.mean()
+
+
+def test_smaller_light_in_tiles_is_itself(rng):
+    frame = room(rng, 150, 602)
+    coarse = shrink(frame.indirect, 4, frame.mask)
+    denoise = functools.partial(jflnr.denoise, dataclasses.replace(frame, indirect=coarse))
+    options = {"levels": 2, "with_error": True, "keep_energy": True}
+    whole = denoise("flr-adaptive", **options)
+    for ours, right in zip(denoise("flr-adaptive", tile=120, **options), whole, strict=True):
+        assert relative(ours, right) < RELATIVE
 
 
 def test_a_nan_in_one_strip_stays_there(rng, backend):

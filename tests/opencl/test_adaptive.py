@@ -104,10 +104,12 @@ def test_energy_is_kept(context: Context) -> None:
     assert np.ptp(found / plain) < 1e-5  # one factor for the whole frame
 
 
-@pytest.mark.parametrize("keep_energy", [False, True])
-def test_the_error_is_told(context: Context, keep_energy: bool) -> None:
+@pytest.mark.parametrize(("keep_energy", "factor"), [(False, 1), (True, 1), (True, 3)])
+def test_the_error_is_told(context: Context, keep_energy: bool, factor: int) -> None:
     target, guides = scene(40, 70, 3, 3)
-    options = {"with_error": True, "keep_energy": keep_energy}
+    options: dict[str, Any] = {"with_error": True, "keep_energy": keep_energy}
+    if factor > 1:  # of 119 x 208 pixels
+        options["guides_map"] = guides.repeat(factor, 0).repeat(factor, 1)[:-1, :-2]
     right = jax.jit(functools.partial(jax_adaptive, **options))(target, guides)
     found = flr_adaptive(target, guides, context=context, **options)
     for one, other in zip(found, right, strict=True):

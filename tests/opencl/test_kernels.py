@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from jflnr.images import guides
 from jflnr.opencl import Context
 from jflnr.opencl.apply import apply
 from jflnr.opencl.blur import blur
 from jflnr.opencl.moments import centre, collect
+from jflnr.opencl.shrink import shrink
 from jflnr.opencl.solve import solve
 from jflnr.regression import apply as jax_apply
 from jflnr.regression import blur as jax_blur
@@ -130,3 +132,12 @@ def test_apply(context: Context, counts: tuple[int, int], size: tuple[int, int],
     context.queue.finish()
     right = in_float64(jax_apply.apply, block=step)(model, guides, shift[: counts[0]])
     assert error(image, right) < tolerances.APPLY
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_shrink(context: Context, dtype: type, masked: bool) -> None:
+    _, image = scene(37, 83, 4, 1)
+    image, mask = image.astype(dtype), (image[..., :1] > 0).astype(np.float32) if masked else None
+    right = guides.shrink(image.astype(np.float64), 3, mask)
+    assert error(shrink(image, 3, mask, context=context).get(), right) < 1e-6

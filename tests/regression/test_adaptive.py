@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jflnr.images.noisy_guides import smooth_guide
+from jflnr.network.flnr import flnr
 from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.adaptive import flr_adaptive as uncompiled
 from jflnr.regression.flr import FLR, flr
@@ -150,8 +151,10 @@ def test_wrong_arguments_are_named(scene):
         uncompiled(y, x, AdaptiveFLR(), levels=0)
     with pytest.raises(ValueError, match="guides"):
         uncompiled(y, x[:4], AdaptiveFLR())
-    with pytest.raises(ValueError, match="needs guides_map at the size of target"):
-        uncompiled(y, x, AdaptiveFLR(), guides_map=jnp.concatenate([x, x]).repeat(2, 1))
+    with pytest.raises(ValueError, match="guides_map must be a whole number of times larger"):
+        uncompiled(y, x, AdaptiveFLR(), guides_map=jnp.concatenate([x, x]))
+    with pytest.raises(ValueError, match="method flnr needs guides_map at the size of target"):
+        flnr(jnp.tile(y[..., :1], 3), x, guides_map=jnp.concatenate([x, x]).repeat(2, 1))
     with pytest.raises(ValueError, match="caution"):
         AdaptiveFLR(caution=-1)
 
