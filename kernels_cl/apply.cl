@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Kernel 4: upsampling of the models and their evaluation on every pixel (section 3.2).
 //
 //   output[c] = a_0c + sum_q a_qc (X_q - shift_q),   a = the models, interpolated bilinearly

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The one pass of method auto over the light: moments on the finest blocks, and as two more planes the mean
 // squares of the brightness and of the weight. Which pixels are left out, as in moments.cl.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Kernel 2: the Gaussian window, a separable convolution of the moments (section 3.2).
 //
 //   columns[k][y][x] = sum_t taps[t] moments[k][y + t - reach][x]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The values about which kernel 1 takes its moments.
 //
 // Defines: those of the headers.

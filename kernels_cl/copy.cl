@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // No part of the method: copies floats, to see what the device's memory can do.
 
 #include "vectors.h"

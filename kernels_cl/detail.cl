@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a fitted picture lacks of the noisy one's detail, before and after the filter along edges
 // (edges.cl), and the picture that it makes.
 //

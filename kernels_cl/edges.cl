@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Planes averaged along the edges that others tell: the filter of features and of detail.
 //
 //   weight of the pixel p + d at p = exp(-(d' S d / a^2 + |d|^2 / w^2 + |n_p - n_(p + d)|^2 / (b a)^2) / 2)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive FLR: the mean brightness of the frame, and keeping it in spite of the weights.
 
 #include "vectors.h"

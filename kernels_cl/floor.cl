@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive FLR: the light of every block, which is to show where its model falls too dark.
 
 #include "vectors.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Grids of blocks for adaptive FLR: their layout, and the way from one grid to the next finer one.
 // Comes after vectors.h.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reading and writing interleaved images, WIDTH neighbouring pixels of one channel at a time. Comes
 // after vectors.h and sizes.h.
 //

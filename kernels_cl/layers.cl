@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The layers of a picture, (H, W, C), as planes for the filter along edges (edges.cl), and back.
 //
 // What is brighter than white is steered by the share of the brightest pixel nearby that it covers.

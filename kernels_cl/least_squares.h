@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The normalised, regularised least squares of the Appendix, for WIDTH blocks at a time. Comes after
 // sizes.h. Define G, the number of guides, if it is not Q.
 //

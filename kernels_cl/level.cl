@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One level of adaptive FLR: what must be alike in a window, the edge-aware window in two passes, along
 // rows and along columns, and the models under it. The models' numbers of guides and channels are
 // constants; that there is a coarser grid is told when the kernels run, as `refines` (window.h), and

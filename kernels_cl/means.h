@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From sums over pixels to planes of moments as grids.h describes them. Comes after products.h and grids.h.
 //
 // Define: PLANES, how many.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive FLR: finer and coarser models put together by how much of their difference d is signal.
 //
 //   share = max(mean(d^2) - caution N, 0) / mean(d^2),   N = what noise alone would make of d^2

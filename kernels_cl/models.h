@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The planes of models, as in grids.h: (Q + 1) x C coefficients, the Q + 1 of the brightness, and the
 // variance of what they predict. Comes after sizes.h and grids.h.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Kernel 1: outer products of [1, X, Y], averaged over blocks (section 3.2).
 //
 //   moments[k] = 1/BLOCK^2  sum over the pixels p of the block  weight(p) u_k(p) v_k(p)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A guide with noise of its own (ambient occlusion from few rays) averaged over 3 x 3 pixels of the
 // same surface: along rows, then along columns.
 //

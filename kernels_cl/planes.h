@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Planes (planes, H, W) without padding, WIDTH neighbouring pixels at a time. Comes after vectors.h.
 
 // WIDTH pixels of a row from x on, those beyond either end of it repeating the last one.

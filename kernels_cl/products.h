@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From pixels to products: what moments.cl and weighted_moments.cl do with WIDTH pixels of a row.
 // Comes after images.h.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Grids of blocks, each half as fine as the one before: means of 2 x 2 blocks, with zeros beyond the
 // border.
 

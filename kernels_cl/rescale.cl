@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The result scaled so that its brightness sums to the input's within `slack`, over the pixels that
 // count, those whose input is finite and whose weight is above 0.
 //

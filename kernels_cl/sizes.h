@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Numbers of channels and layouts, for moments.cl, solve.cl and apply.cl.
 //
 // Defines, given by the host with -D:

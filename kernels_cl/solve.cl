@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Kernel 3: the normalised, regularised least squares of the Appendix (section 3.2), per block and
 // from the blurred moments, each divided by moments[0]. See least_squares.h.
 //

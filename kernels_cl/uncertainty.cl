@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive FLR: how far its result may be from the truth (jflnr/regression/uncertainty.py).
 //
 // Define beside those of the headers: FIRST, if the coarser grid is the coarsest, of which only the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Vectors of neighbours, for every kernel.
 //
 // Define: WIDTH, the neighbours in x that one work-item handles together: 1 for a GPU, 4 or 8 for a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Method auto: what every block counts, from its own brightness by the first fit.
 
 #include "vectors.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pass 2 of adaptive FLR: moments of weighted pixels (Eq. 9) on the finest blocks.
 //
 //   weight = 1 / ((pilot / mean)^exponent + offset),   pilot = the first fit at this pixel

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The edge-aware window over blocks, one line at a time. Comes after grids.h.
 //
 // Block i weighs block j of its row or column by

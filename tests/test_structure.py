@@ -1,8 +1,9 @@
-"""The folders of the package form layers: none of them needs, by way of others, itself."""
+"""The folders of the package form layers; what is copied without the package says its licence."""
 
 from __future__ import annotations
 
 import ast
+import tomllib
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -41,3 +42,15 @@ def test_no_folder_needs_itself_by_way_of_others() -> None:
         needs.setdefault(node, set()).update(found - {None, node})
     assert needs["large"] and needs["denoising"]
     TopologicalSorter(needs).prepare()
+
+
+def test_what_an_engine_copies_says_its_licence() -> None:
+    """Kernels, their headers and the example, wherever they end up."""
+    repository = ROOT.parent
+    licence = tomllib.loads((repository / "pyproject.toml").read_text())["project"]["license"]
+    files = [path for path in (repository / "kernels_cl").rglob("*") if path.is_file()]
+    files.append(repository / "docs" / "examples" / "host.c")
+    assert len(files) > 50
+    for path in files:
+        first = path.read_text().splitlines()[0]
+        assert first == f"// SPDX-License-Identifier: {licence}", path

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from jflnr import __version__
-from jflnr.cli import completion, denoise, doctor, fit, info, metrics, report, train
+from jflnr.cli import completion, denoise, doctor, fit, info, metrics, report, train, view
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence, tinted
 
 EXAMPLES = """\
@@ -27,6 +27,7 @@ COMMANDS = {
     "info": info,
     "metrics": metrics,
     "report": report,
+    "view": view,
     "fit": fit,
     "train": train,
     "doctor": doctor,

@@ -38,11 +38,15 @@ def expand(inputs: Sequence[Path]) -> list[Path]:
         if not path.is_dir():
             files.append(path)
             continue
-        found = sorted((p for p in path.glob("[!.]*") if p.suffix.lower() == ".exr"), key=natural)
-        if not found:
+        if not (found := frames_in(path)):
             raise ValueError(f"{path}: there is no EXR file in this folder")
         files.extend(found)
     return files
+
+
+def frames_in(folder: Path) -> list[Path]:
+    """The EXR files in a folder, in order."""
+    return sorted((p for p in folder.glob("[!.]*") if p.suffix.lower() == ".exr"), key=natural)
 
 
 def natural(path: Path) -> list[tuple[float, str]]:

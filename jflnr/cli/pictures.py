@@ -24,14 +24,19 @@ def write_preview(path: Path, picture: np.ndarray, scale: float) -> None:
 
 def explain(path: Path, frame: "Frame", method: Any, guides: Sequence[str] | None) -> list[str]:
     """Where method auto refines a frame, in lines for a person and as a map."""
+    refined, said = plan_of(frame, method, guides)
+    _save(path, np.where(refined[..., None], REFINED, COARSE))
+    return [said, f"map: {path}"]
+
+
+def plan_of(frame: "Frame", method: Any, guides: Sequence[str] | None) -> tuple[np.ndarray, str]:
+    """Where method auto refines a frame, `(H, W)`, and how much of it that is in words."""
     from jflnr.regression.auto import signal_in_tiles
 
     signal, side = signal_in_tiles(frame, method, guides)
     height, width = frame.depth.shape[:2]
     refined = (signal > method.worth).repeat(side, 0).repeat(side, 1)[:height, :width]
-    _save(path, np.where(refined[..., None], REFINED, COARSE))
-    share = f"{refined.mean():.0%} of the frame"
-    return [f"refined: {share}, in tiles of {side} pixels", f"map: {path}"]
+    return refined, f"refined: {refined.mean():.0%} of the frame, in tiles of {side} pixels"
 
 
 def _save(path: Path, pixels: np.ndarray) -> None:

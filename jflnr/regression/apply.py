@@ -41,7 +41,7 @@ def apply(
         return apply_strip(cut(guides, first, rows), models, shift, block, floor)
 
     image = jnp.zeros((height, width, coefficients.shape[1]), coefficients.dtype)
-    return fill(image, 0, height, 1, step_of(block, ROWS), strip)
+    return fill(image, 0, height, 1, step_of(block, ROWS), strip, align=block)
 
 
 def guides_to_map(parts: dict) -> Guides:

@@ -7,12 +7,13 @@ the ones before it already explain: that guide's slope is 0.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.division import divide
 
 Solver = Literal["cholesky", "block-inverse"]
+Solve: TypeAlias = "Callable[[jax.Array, jax.Array], jax.Array]"
 # Roundings that a pivot may be off by.
 ROUNDING = 8
 # So many guides are solved step by step as written out; of more, that compiles for minutes.
@@ -22,6 +23,17 @@ WRITTEN_OUT = 8
 def inverse_pivot(pivot: jax.Array) -> jax.Array:
     """One over a pivot, 0 if it is no larger than the rounding error."""
     return divide(1, pivot, ROUNDING * jnp.finfo(pivot.dtype).eps)
+
+
+def by_its_equation(solver: Solve, matrix: jax.Array, right: jax.Array) -> jax.Array:
+    """`solver(matrix, right)`, with the derivative of the equation, `A dx = db - dA x`, in place of
+    that of the solver's steps: the same number, which compiles in a fraction of the time.
+
+    matrix: `(Q, Q, h, w)`, symmetric. right: `(Q, C, h, w)`. Returns `(Q, C, h, w)`.
+    """
+    return lax.custom_linear_solve(
+        lambda x: _product(matrix, x), right, lambda _, b: solver(matrix, b), symmetric=True
+    )
 
 
 def eliminate(matrix: jax.Array, right: jax.Array) -> jax.Array:
@@ -140,7 +152,7 @@ def _product(a: jax.Array, b: jax.Array) -> jax.Array:
     return jnp.sum(a[:, :, None] * b, axis=1)
 
 
-SOLVERS: dict[str, Callable[[jax.Array, jax.Array], jax.Array]] = {
+SOLVERS: dict[str, Solve] = {
     "cholesky": cholesky_solve,
     "block-inverse": block_inverse_solve,
 }

@@ -103,7 +103,9 @@ def fit_level(
         features = guide_features(grid, guides, numbers)
     window = window_over(features, numbers.sigma)
     moments = (
-        gather_moments(grid.moments, window, numbers.sigma, guides, channels)
+        gather_moments(
+            grid.moments, window, numbers.sigma, guides, channels, numbers.position_ridge
+        )
         if slopes
         else gather(grid.moments, window)
     )
@@ -118,9 +120,7 @@ def fit_level(
     relative = variance / (jnp.maximum(luminance, 0) ** 2 + 0.01 * mean**2 + 1e-30)
     ridge = jnp.minimum(numbers.noise_ridge * relative, 1)
 
-    # Positions are centred on the window already, so only their own ridge is added.
-    for i in range(guides + 1, guides + 1 + positions):
-        moments = moments.at[index_xx(i, i)].add(numbers.position_ridge * moments[0])
+    # Positions are centred on the window already, so only their own ridge, above, is added.
     centred = jnp.concatenate([shift, jnp.zeros(positions, shift.dtype)])
     regular = numbers.eps + ridge, numbers.eps_prime + ridge
     coefficients = solve_strips(moments, centred, *regular, channels)

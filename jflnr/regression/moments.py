@@ -23,6 +23,9 @@ Guides: TypeAlias = "jax.Array | tuple[jax.Array, ...]"
 # overflow in float32.
 FARTHEST = 1e16
 
+# Rows of pixels that stay in the cache while their products are formed, and keep cores busy.
+TOGETHER = 24
+
 
 def index_xx(i: int, j: int) -> int:
     """Plane of the moment of regressors i and j, where regressor 0 is the constant 1."""
@@ -60,8 +63,8 @@ def centre(guides: Guides, weight: jax.Array | None = None) -> jax.Array:
     far) do not count, or None. Returns `(Q,)`.
     """
     counts = None if weight is None else _sparse(weight) > 0
-    values = [_sparse_mean(_sparse(plane), counts) for plane in planes(guides)]
-    return lax.stop_gradient(jnp.stack(values) if values else jnp.zeros(0))
+    sample = [_sparse(plane) for plane in planes(guides)]
+    return lax.stop_gradient(_sparse_mean(jnp.stack(sample), counts) if sample else jnp.zeros(0))
 
 
 def unit_of(image: jax.Array) -> jax.Array:
@@ -87,8 +90,8 @@ def _sparse_mean(sample: jax.Array, counts: jax.Array | None) -> jax.Array:
     typical = jnp.abs(sample) < FARTHEST
     if counts is not None:
         typical &= counts
-    total = jnp.sum(jnp.where(typical, sample, 0))
-    return total / jnp.maximum(jnp.sum(typical), 1).astype(sample.dtype)
+    total = jnp.sum(jnp.where(typical, sample, 0), axis=(-2, -1))
+    return total / jnp.maximum(jnp.sum(typical, axis=(-2, -1)), 1).astype(sample.dtype)
 
 
 def from_shift(plane: jax.Array, shift: jax.Array) -> jax.Array:
@@ -132,10 +135,6 @@ def collect(
     """
     height, width = (-(-size // block) for size in target.shape[:2])
     count = plane_count(shift.size, target.shape[2]) + 2 * (brightness is not None)
-    whole = target.shape[0] // block
-    # 24 rows of pixels stay in the cache while their products are formed, and keep cores busy;
-    # where they do not divide the frame, fewer: a second program for the rest would compile longer.
-    together = max(k for k in range(1, max(24 // block, 1) + 1) if whole % k == 0)
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
         images = cut((target, guides, weight), first, rows)
@@ -145,7 +144,7 @@ def collect(
         return jnp.moveaxis(jax.vmap(make)(*lines), 0, 1)
 
     empty = jnp.zeros((count, height, width), working_type(target, *jax.tree.leaves(guides)))
-    return fill(empty, 1, target.shape[0], block, together * block, strip)
+    return fill(empty, 1, target.shape[0], block, step_of(block, TOGETHER), strip)
 
 
 def _strip_moments(

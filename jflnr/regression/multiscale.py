@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
 from jflnr.regression.merge import signal_share
-from jflnr.regression.resampling import double, halve
+from jflnr.regression.resampling import double, double_all, halve
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
@@ -45,10 +45,9 @@ def fit_levels(
     coarse, merged, steps = first, first.coefficients, list[Step]()
     for grid in reversed(finer):
         size, window, finest = grid.moments.shape[1:], coarse.window, grid is finer[0]
-        coarse = coarse._replace(
-            coefficients=double(coarse.coefficients, *size), variance=double(coarse.variance, *size)
-        )
-        merged = double(merged, *size)
+        known = coarse.coefficients, merged, coarse.variance
+        coefficients, merged, variance = double_all(known, *size)
+        coarse = Fit(coefficients, variance, window)
         luminance = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
         # Windows end where what is known so far of the brightness changes.
         edge = numbers.brightness_scale * jnp.log(luminance / mean + 0.1)

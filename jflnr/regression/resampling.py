@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from jflnr.lazy import jax, jnp, lax
 
 
@@ -25,16 +29,23 @@ def double(planes: jax.Array, height: int, width: int) -> jax.Array:
     around = [(0, 0)] * len(lead) + [(1, 1), (1, 1)]
     # The barriers: interleaving and interpolating at once takes several times as long.
     planes = lax.optimization_barrier(jnp.pad(planes, around, mode="edge"))
-    rows = []
-    for row in _halves(planes, planes.ndim - 2):
-        columns = lax.optimization_barrier(_halves(row, row.ndim - 1))
-        rows.append(jnp.stack(columns, axis=-1).reshape(*lead, h, 2 * w))
-    doubled = jnp.stack(lax.optimization_barrier(rows), axis=-2).reshape(*lead, 2 * h, 2 * w)
+    rows = lax.optimization_barrier(_halves(planes, planes.ndim - 2))
+    columns = lax.optimization_barrier(_halves(rows, planes.ndim))
+    doubled = jnp.moveaxis(columns, (0, 1), (-1, -3)).reshape(*lead, 2 * h, 2 * w)
     return doubled[..., :height, :width]
 
 
-def _halves(planes: jax.Array, axis: int) -> tuple[jax.Array, jax.Array]:
-    """Values a quarter of a block before and after the blocks' centres, without the outer two."""
+def double_all(arrays: Sequence[jax.Array], height: int, width: int) -> list[jax.Array]:
+    """`double` of several, which compiles in the time of one."""
+    planes = [array.reshape(-1, *array.shape[-2:]) for array in arrays]
+    doubled = double(jnp.concatenate(planes), height, width)
+    parts = jnp.split(doubled, np.cumsum([len(p) for p in planes])[:-1])
+    return [p.reshape(*a.shape[:-2], height, width) for p, a in zip(parts, arrays, strict=True)]
+
+
+def _halves(planes: jax.Array, axis: int) -> jax.Array:
+    """Values a quarter of a block before and after the blocks' centres, without the outer two:
+    `(2, ...)`."""
     size = planes.shape[axis]
     before, here, after = (lax.slice_in_dim(planes, k, size - 2 + k, axis=axis) for k in range(3))
-    return (before + 3 * here) / 4, (after + 3 * here) / 4
+    return jnp.stack([(before + 3 * here) / 4, (after + 3 * here) / 4])

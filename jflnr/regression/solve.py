@@ -8,7 +8,7 @@ import numpy as np
 
 from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.division import divide
-from jflnr.regression.elimination import SOLVERS, Solver, eliminate
+from jflnr.regression.elimination import SOLVERS, Solver, by_its_equation, eliminate
 from jflnr.regression.moments import index_xx, index_xy
 from jflnr.regression.strips import map_rows
 
@@ -74,7 +74,8 @@ def normal_equations(
     regular = covariance + outer + jnp.where(diagonal, outer + eps_prime + unknown, 0)
 
     # Eq. 19 to 22, with a unit diagonal before eps' is added.
-    scale = lax.rsqrt(jnp.stack([regular[i, i] for i in range(count)])) if count else mean_x
+    # A slice: as a stack of Q planes it compiles for a second.
+    scale = lax.rsqrt(regular.reshape(-1, *mean_x.shape[1:])[:: count + 1])
     correlation = jnp.where(diagonal, 1 + eps_prime, regular * scale[:, None] * scale)
     cross = cross.reshape(count, channels, *means.shape[1:])
     right = (cross - mean_x[:, None] * mean_y) * scale[:, None]
@@ -94,7 +95,7 @@ def solve(
     eps, eps_prime = (number.astype(moments.dtype) for number in regularisation(method))
     moments = jnp.where(jnp.all(jnp.isfinite(moments), axis=0), moments, 0)
     system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING)
-    return system.models(SOLVERS[solver](system.correlation, system.right))
+    return system.models(by_its_equation(SOLVERS[solver], system.correlation, system.right))
 
 
 def regularisation(method: Any) -> tuple[Any, Any]:
@@ -116,6 +117,7 @@ def solve_strips(
     def solve_some(strip: tuple[jax.Array, jax.Array, jax.Array]) -> jax.Array:
         moments, eps, eps_prime = strip
         system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING_OF_STRIPS)
-        return system.models(eliminate(system.correlation, system.right))
+        return system.models(by_its_equation(eliminate, system.correlation, system.right))
 
-    return map_rows(solve_some, (moments, eps, eps_prime))
+    lead = shift.size + 1, channels
+    return map_rows(solve_some, (moments, eps, eps_prime), lead)

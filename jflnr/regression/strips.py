@@ -25,24 +25,31 @@ def fill(
     block: int,
     step: int,
     make: Callable[[jax.Array | int, int], jax.Array],
+    align: int | None = None,
 ) -> jax.Array:
     """Fill `array` along `axis`, where it has a row for every `block` rows of pixels.
 
     Nothing but the array itself is as large as the frame: strips that were put together afterwards
-    would be there twice.
+    would be there twice. All strips are alike, since the compiler takes its time for each kind, but
+    for what lies beyond the last multiple of `align`.
 
-    height: of the frame, in pixels. step: rows of pixels at a time, a multiple of `block`. make:
-    what belongs into the array for some rows of pixels, given the first and their number.
+    height: of the frame, in pixels. step: rows of pixels at a time, at most, a multiple of `align`,
+    where strips begin; it is a multiple of `block`, or that if None. make: what belongs into the
+    array for some rows of pixels, given the first and their number.
     """
-    whole, rest = divmod(height, step)
+    align = align or block
+    end = height - height % align
 
-    def add(strip: jax.Array | int, array: jax.Array, rows: int) -> jax.Array:
-        made = make(strip * step, rows)
-        return lax.dynamic_update_slice_in_dim(array, made, strip * (step // block), axis)
+    def add(first: jax.Array | int, array: jax.Array, rows: int) -> jax.Array:
+        return lax.dynamic_update_slice_in_dim(array, make(first, rows), first // block, axis)
 
-    if whole:
-        array = lax.fori_loop(0, whole, lambda strip, array: add(strip, array, step), array)
-    return add(whole, array, rest) if rest else array
+    if end:
+        count = -(-end // step)
+        rows = -(-end // (count * align)) * align
+        # The last strip ends with the frame; what it shares with the one before is the same.
+        first = lambda strip: jnp.minimum(strip * rows, end - rows)
+        array = lax.fori_loop(0, count, lambda i, array: add(first(i), array, rows), array)
+    return add(end, array, height - end) if end < height else array
 
 
 def cut(images: Any, first: jax.Array | int, rows: int) -> Any:
@@ -50,25 +57,21 @@ def cut(images: Any, first: jax.Array | int, rows: int) -> Any:
     return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows), images)
 
 
-def map_rows(make: Callable[[Any], Any], planes: Any) -> Any:
-    """`make` of a few rows of a grid of blocks at a time.
+def map_rows(make: Callable[[Any], jax.Array], planes: Any, lead: tuple[int, ...]) -> jax.Array:
+    """`make` of a few rows of a grid of blocks at a time, `(*lead, h, w)`.
 
-    planes: pytree of `(..., h, w)`, of which `make` takes some rows and returns a pytree of such
-    planes.
+    planes: pytree of `(..., h, w)`, of which `make` takes some rows and returns `(*lead, rows, w)`.
     """
-    height, width = jax.tree.leaves(planes)[0].shape[-2:]
+    arrays = jax.tree.leaves(planes)
+    height, width = arrays[0].shape[-2:]
     rows = min(max(TOGETHER // width, 1), height)
 
-    def some(first: jax.Array | int) -> Any:
-        return jax.tree.map(lambda a: lax.dynamic_slice_in_dim(a, first, rows, a.ndim - 2), planes)
-
-    def add(strip: jax.Array, whole: Any) -> Any:
+    def add(strip: jax.Array, whole: jax.Array) -> jax.Array:
         # The last strip ends with the grid; what it shares with the one before is the same.
         first = jnp.minimum(strip * rows, height - rows)
-        made = make(lax.optimization_barrier(some(first)))
-        put = lambda a, b: lax.dynamic_update_slice_in_dim(a, b, first, a.ndim - 2)
-        return jax.tree.map(put, whole, made)
+        cut = lambda a: lax.dynamic_slice_in_dim(a, first, rows, a.ndim - 2)
+        made = make(lax.optimization_barrier(jax.tree.map(cut, planes)))
+        return lax.dynamic_update_slice_in_dim(whole, made, first, whole.ndim - 2)
 
-    shapes = jax.eval_shape(make, some(0))
-    empty = lambda a: jnp.zeros((*a.shape[:-2], height, width), a.dtype)
-    return lax.fori_loop(0, -(-height // rows), add, jax.tree.map(empty, shapes))
+    empty = jnp.zeros((*lead, height, width), arrays[0].dtype)
+    return lax.fori_loop(0, -(-height // rows), add, empty)

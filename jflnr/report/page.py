@@ -35,24 +35,23 @@ def write_report(
     extra: HTML that is put before these tables; its scripts may use the page's functions once the
     page is loaded.
     """
-    content = {
+    text = page(title, content(scenes, tables), extra)
+    write_atomically(path, text.encode(errors="replace"))  # names of files need not be UTF-8
+
+
+def content(scenes: Sequence[Scene], tables: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """What the page shows, as values of JavaScript."""
+    return {
         "scenes": [scene_data(scene) for scene in scenes],
         "tables": list(tables),
         "labels": LABELS | {"ms": "ms"},
         "lower": LOWER_IS_BETTER,
         "epsilon": RELATIVE_EPSILON,
     }
-    text = page(title, content, extra)
-    write_atomically(path, text.encode(errors="replace"))  # names of files need not be UTF-8
 
 
 def page(title: str, content: Mapping[str, Any], extra: str) -> str:
     """The template with styles, scripts and data put in."""
-    folder = files("jflnr.report") / "page"
-
-    def read(name: str) -> str:
-        return (folder / name).read_text(encoding="utf-8")
-
     parts = {
         "STYLE": read("style.css"),
         "EXTRA": extra,
@@ -63,6 +62,11 @@ def page(title: str, content: Mapping[str, Any], extra: str) -> str:
     return re.sub("%%([A-Z]+)%%", lambda mark: parts[mark[1]], read("page.html"))
 
 
+def read(name: str) -> str:
+    """A file of the page."""
+    return (files("jflnr.report") / "page" / name).read_text(encoding="utf-8")
+
+
 def script_data(content: Mapping[str, Any]) -> str:
     """JavaScript, not JSON: NaN and Infinity stay. No "<": nothing can end the script early."""
     return json.dumps(content).replace("<", "\\u003c")
@@ -70,7 +74,7 @@ def script_data(content: Mapping[str, Any]) -> str:
 
 def scene_data(scene: Scene) -> dict[str, Any]:
     """What the page needs to know of one scene, as JSON values."""
-    unit = _unit(scene)
+    unit = unit_of(scene)
     layers = {} if scene.frame is None else _layers(scene.frame, unit)
     return {
         "name": scene.name,
@@ -79,18 +83,26 @@ def scene_data(scene: Scene) -> dict[str, Any]:
         "unit": unit,
         "exposures": _exposures(scene),
         "layers": layers,
-        "images": [_image(scene, name, unit) for name in scene.images],
+        "images": [image_data(scene, name, unit) for name in scene.images],
         "crops": find_crops(scene),
     }
 
 
-def _image(scene: Scene, name: str, unit: float) -> dict[str, Any]:
+def image_data(
+    scene: Scene, name: str, unit: float, maps: Mapping[str, np.ndarray] | None = None
+) -> dict[str, Any]:
+    """What the page needs to know of one version.
+
+    unit: that of the scene's data. maps: more maps `(H, W)` of 0 to 1, by the page's names.
+    """
     measured = REFERENCE in scene.images and name != REFERENCE
     errors = _flip(scene, name) if measured else None
+    maps = {**({} if errors is None else {"flip": errors}), **(maps or {})}
+    bytes_of = lambda values: np.uint8(np.round(255 * values)).tobytes()
     return {
         "name": name,
         "light": pack(scene.images[name], unit),
-        "flip": None if errors is None else _deflated(np.uint8(np.round(255 * errors)).tobytes()),
+        "maps": {name: _deflated(bytes_of(values)) for name, values in maps.items()},
         "metrics": scene.measure(name) if measured else None,
     }
 
@@ -113,7 +125,7 @@ def _layers(frame: Frame, unit: float) -> dict[str, str]:
     return found
 
 
-def _unit(scene: Scene) -> float:
+def unit_of(scene: Scene) -> float:
     """A power of two near the mean light, so that dividing by it is exact and suits half floats."""
     image = _judge(scene)
     mean = float(np.mean(np.abs(image[np.isfinite(image)]), dtype=np.float64))

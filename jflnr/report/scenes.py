@@ -46,12 +46,14 @@ class Scene:
         return metrics.measure(self.frame, self.images[name])
 
 
-def of_frame(name: str, frame: Frame, lights: dict[str, np.ndarray]) -> Scene:
-    """The frame's noisy light, the denoised `lights`, and its reference if it has one."""
-    images = {NOISY: np.asarray(frame.indirect), **lights}
+def of_frame(name: str, frame: Frame, denoised: dict[str, np.ndarray]) -> Scene:
+    """The frame's noisy light, or its picture if it is another program's, what is `denoised` of
+    that, and its reference if it has one."""
+    whole = frame.beauty is not None
+    images = {NOISY: np.asarray(frame.beauty if whole else frame.indirect), **denoised}
     if frame.reference is not None:
-        images[REFERENCE] = np.asarray(frame.reference)
-    return Scene(name, images, frame)
+        images.setdefault(REFERENCE, np.asarray(frame.reference))
+    return Scene(name, images, None if whole else frame)
 
 
 def collect(
@@ -80,13 +82,10 @@ def collect(
     scenes = []
     for source in frames:
         names = _names([path for path in pictures if owners[path] == source], source.stem)
-        exr.check_aligned(source, *names)
+        exr.check_aligned(source, *names, *([] if reference is None else [reference]))
         frame = read_frame(source, spp, layers)
         if frame.beauty is not None:
-            images = _plain({source: NOISY} | names, channels, reference)
-            if frame.reference is not None:
-                images.setdefault(REFERENCE, np.asarray(frame.reference))
-            scenes.append(Scene(source.stem, images))
+            scenes.append(of_frame(source.stem, frame, _plain(names, channels, reference)))
             continue
         if reference is not None:
             raise ValueError(

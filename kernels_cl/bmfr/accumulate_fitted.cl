@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // BMFR, phase III: the mean of the fitted light over time, multiplied by albedo (Koskela et al. 2019,
 // section 3.5).
 

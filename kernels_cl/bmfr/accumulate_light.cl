@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // BMFR, phase I: the mean of the noisy samples at each place, with an age limit (Koskela et al. 2019,
 // section 3.2).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The grid of blocks and the features of Eq. 8, for fit.cl and weighted_sum.cl. Comes after images.h.
 //
 // The first block begins offset_y rows above and offset_x columns left of the frame, less than BLOCK.

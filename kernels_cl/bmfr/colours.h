@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From red, green and blue to luma, orange and green, and back without loss. Comes after vectors.h.
 
 INLINE void to_ycocg(real *v)

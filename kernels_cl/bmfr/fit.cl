@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // BMFR, phase II: least squares in every block by augmented Householder QR (Koskela et al. 2019, 3.4).
 //
 //   [T + N, z] = Q R,   R_kk alpha = r,   T = 1, guides and squares scaled to [-1, 1] in the block

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Noise that depends on nothing but a counter; its twin in JAX is in jflnr/bmfr/fit.py.
 // Comes after vectors.h.
 

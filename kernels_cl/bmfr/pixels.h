@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reading the pixels of a block, which may lie beyond the frame's border. Comes after blocks.h.
 
 INLINE int mirrored(int i, int size)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // BMFR, phase III: temporal anti-aliasing (Karis 2014, "High Quality Temporal Supersampling"). The
 // previous result is brought into the range around the pixel, the mean of those of 5 and of 9 pixels.
 

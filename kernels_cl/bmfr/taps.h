@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The four pixels of the previous frame around the place where a pixel was; the twin of
 // jflnr/temporal/reproject.py. Comes after images.h.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // BMFR, phase II: the fitted light, T alpha with the features as they are (Eq. 6), not below 0.
 
 #include "vectors.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A layer of the network (jflnr/network/unet.py): convolution, bias, LeakyReLU.
 //
 // Defines beside WIDTH: SIDE of the kernel in blocks, 1 or 3; STRIDE, 1 or 2; TOGETHER, the outputs of

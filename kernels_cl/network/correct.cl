@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The light times the factors that the network gives (jflnr/network/flnr.py, picture.py).
 //
 // Defines beside those of the headers, with Q = 0: LARGEST, the logarithm of the largest factor. For

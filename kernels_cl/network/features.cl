@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the network reads of every pixel and of the means over 2 x 2 of them, in maps at half of the
 // resolution: 2 x 2 pixels side by side as channels (jflnr/network/features.py, unet.pack).
 //

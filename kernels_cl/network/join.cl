@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What comes from a coarser scale, repeated over 2 x 2 blocks and added to a finer one's; LeakyReLU.
 
 #include "vectors.h"

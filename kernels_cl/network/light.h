@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the network reads of light (jflnr/network/features.py): for features.cl.
 //
 // Define: BRIGHTEST, above which no light is seen. light, error: (H, W, C) and (H, W) in float. mean:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Maps of the network's channels. Comes after vectors.h and grids.h.
 //
 // They lie as (h + 2, count, pitch) over h x w blocks: a row of zeros above and below, MARGIN zeros

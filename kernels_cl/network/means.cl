@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the network reads of means over 2 x 2 values of a finer grid.
 
 #include "vectors.h"

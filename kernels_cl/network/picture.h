@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the network reads of whole pictures (jflnr/network/picture.py): for features.cl.
 //
 // Images (H, W, 3) and (H, W), as in `picture.Read`.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the network reads of means (jflnr/network/features.py). Comes after vectors.h.
 //
 // Define: DARK, the share of the frame's mean below which light is as good as dark.

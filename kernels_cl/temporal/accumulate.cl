@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An average that follows the light, with one more frame in it, and one of guides beside it: host side
 // in jflnr/opencl/temporal.py, twins in jflnr/temporal/accumulate.py and sequence.py.
 

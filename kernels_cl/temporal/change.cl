@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How much of the fitted difference to the history is signal: host side in
 // jflnr/opencl/temporal_change.py, twin in jflnr/temporal/change.py, which says why.
 

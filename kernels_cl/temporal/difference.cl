@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The difference between a new frame and the history, ready for moments.cl: host side in
 // jflnr/opencl/temporal_change.py, twin in jflnr/temporal/change.py.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Averages of the previous frame where its pixels are now: host side in jflnr/opencl/temporal.py, twin
 // in jflnr/temporal/reproject.py.
 

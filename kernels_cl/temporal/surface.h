@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tells surfaces apart; the twin of `_alike` in jflnr/temporal/reproject.py. Comes after
 // bmfr/taps.h.
 //

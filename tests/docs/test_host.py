@@ -11,10 +11,11 @@ import pytest
 import jflnr
 from docs.launches import launches, parameters, tables
 from jflnr.images.inputs import prepare
+from jflnr.methods import method_of
 from jflnr.opencl import NoDevice
-from jflnr.regression.flr import DEFAULT, flr
 
 ROOT = Path(__file__).parents[2]
+METHODS = pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
 
 
 @pytest.fixture(scope="module")
@@ -38,39 +39,49 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return ["env", *found, str(program), str(ROOT / "kernels_cl")]
 
 
-def test_c_host_computes_what_jax_does(host: list[str], tmp_path: Path) -> None:
+@METHODS
+@pytest.mark.parametrize(("height", "width"), [(70, 101), (8, 8), (1, 3)])
+def test_c_host_computes_what_jax_does(
+    host: list[str], tmp_path: Path, method: str, height: int, width: int
+) -> None:
     """Odd sizes, several work-items per row; float32 on both sides, so 1e-5 of the largest."""
-    rng, height, width = np.random.default_rng(0), 70, 101
+    rng = np.random.default_rng(0)
     y, x = np.mgrid[:height, :width][..., None] / 40
     guides = np.concatenate([np.sin(x), np.cos(y), x * y, x + 2, np.sin(3 * x + y)], axis=-1)
     light = (1 + guides[..., :3] ** 2) * rng.exponential(size=(height, width, 3))
     light, guides = light.astype(np.float32), guides.astype(np.float32)
-    found = denoised(host, tmp_path, light, guides)
-    expected = np.asarray(flr(light, guides, DEFAULT))
+    found = denoised(host, tmp_path, method, light, guides)
+    regress = {"flr": jflnr.flr, "flr-adaptive": jflnr.flr_adaptive}[method]
+    expected = np.asarray(regress(light, guides))
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
 
 
+@METHODS
 @pytest.mark.parametrize("backend", jflnr.BACKENDS)
 def test_c_host_computes_what_denoise_does(
-    host: list[str], tmp_path: Path, frame: jflnr.Frame, backend: str
+    host: list[str], tmp_path: Path, frame: jflnr.Frame, backend: str, method: str
 ) -> None:
-    names, inputs = prepare(frame, None, DEFAULT)
-    guides = np.concatenate(DEFAULT.images(inputs, names)["guides"], axis=-1).astype(np.float32)
-    found = denoised(host, tmp_path, np.asarray(frame.indirect, np.float32), guides)
-    expected = np.asarray(jflnr.denoise(frame, "flr", backend=backend))
+    default = method_of(method)
+    names, inputs = prepare(frame, None, default)
+    guides = np.concatenate(default.images(inputs, names)["guides"], axis=-1).astype(np.float32)
+    light = np.asarray(frame.indirect, np.float32)
+    found = denoised(host, tmp_path, method, light, guides)
+    expected = np.asarray(jflnr.denoise(frame, method, backend=backend))
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def denoised(host: list[str], folder: Path, light: np.ndarray, guides: np.ndarray) -> np.ndarray:
+def denoised(
+    host: list[str], folder: Path, method: str, light: np.ndarray, guides: np.ndarray
+) -> np.ndarray:
     for name, image in (("light", light), ("guides", guides)):
         image.tofile(folder / f"{name}.raw")
     files = [str(folder / f"{name}.raw") for name in ("light", "guides", "denoised")]
     height, width = light.shape[:2]
-    subprocess.run([*host, str(width), str(height), *files], check=True)
+    subprocess.run([*host, method, str(width), str(height), *files], check=True)
     return np.fromfile(files[2], np.float32).reshape(light.shape)
 
 
-@pytest.mark.parametrize("method", ["flr", "flr-adaptive"])
+@METHODS
 def test_the_page_has_what_is_launched(method: str) -> None:
     try:
         printed = tables(launches(method, 640, 360))
@@ -91,15 +102,25 @@ def test_every_parameter_has_a_name_and_an_argument() -> None:
     assert dict(zip(parameters(said), said.arguments, strict=True))["error"].shape == (32, 32, 1)
 
 
-def test_c_host_says_what_is_wrong(host: list[str], tmp_path: Path) -> None:
-    done = subprocess.run([*host], capture_output=True, text=True, check=False)
-    assert done.returncode == 2 and done.stderr.startswith("use: host KERNELS_CL")
-    short = tmp_path / "short.raw"
-    short.write_bytes(b"1234")
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        ([], 2, "use: host KERNELS_CL flr|flr-adaptive WIDTH HEIGHT"),
+        (["bmfr", "8", "8", "short", "short", "out"], 2, "use: host"),
+        (["flr", "0", "8", "short", "short", "out"], 2, "WIDTH must be a whole number from 1 to"),
+        (["flr", "8", "8x", "short", "short", "out"], 2, "HEIGHT must be a whole number from 1 to"),
+        (["flr", "8", "8", "short", "short", "out"], 1, "short does not hold 192 floats"),
+        (["flr", "1", "1", "long", "long", "out"], 1, "long does not hold 3 floats"),
+        (["flr", "1", "1", "missing", "long", "out"], 1, "missing does not hold 3 floats"),
+    ],
+)
+def test_c_host_says_what_is_wrong(
+    host: list[str], tmp_path: Path, arguments: list[str], code: int, said: str
+) -> None:
+    (tmp_path / "short").write_bytes(b"1234")
+    (tmp_path / "long").write_bytes(bytes(4 * 192))
     done = subprocess.run(
-        [*host, "8", "8", str(short), str(short), "out.raw"],
-        capture_output=True,
-        text=True,
-        check=False,
+        [*host, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 1 and "does not hold 192 floats" in done.stderr
+    assert done.returncode == code and done.stderr.startswith(said)
+    assert done.stderr.count("\n") == 1 and not (tmp_path / "out").exists()

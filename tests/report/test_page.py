@@ -149,7 +149,9 @@ def test_maps_average_to_the_metrics(page: Any, scene: Scene) -> None:
     darkest, brightest = page.evaluate("[magma(0), magma(1)]")
     assert sum(darkest) < 10 and sum(brightest) > 600
     if expected["flip"] is not None:
-        mean = page.evaluate("state.scene.images[1].flip.reduce((a, b) => a + b) / 40 / 24 / 255")
+        mean = page.evaluate(
+            "state.scene.images[1].maps.flip.reduce((a, b) => a + b) / 40 / 24 / 255"
+        )
         assert mean == pytest.approx(expected["flip"], abs=2e-3)
 
 

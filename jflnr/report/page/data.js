@@ -28,19 +28,21 @@ async function unpack(text, unit) {
   return values;
 }
 
-/** A scene with its numbers, from what the page holds. */
+/** One version of a scene with its numbers, and maps of 0..255. */
+async function loadImage(stored, unit) {
+  const image = { ...stored, maps: {}, canvases: {}, radiance: {} };
+  image.light = await unpack(stored.light, unit);
+  for (const [name, text] of Object.entries(stored.maps)) image.maps[name] = await inflate(text);
+  return image;
+}
+
+/** A scene with its numbers, from what the page holds, or from where it is. */
 async function loadScene(stored) {
+  if (stored.from) stored = await stored.from();
   const scene = { ...stored, layers: {}, images: [] };
   for (const [name, text] of Object.entries(stored.layers))
     scene.layers[name] = await unpack(text, name === "albedo" ? 1 : stored.unit);
-  for (const image of stored.images)
-    scene.images.push({
-      ...image,
-      light: await unpack(image.light, stored.unit),
-      flip: image.flip && (await inflate(image.flip)),
-      canvases: {},
-      radiance: {},
-    });
+  for (const image of stored.images) scene.images.push(await loadImage(image, stored.unit));
   scene.reference = scene.images.find((image) => image.name === "reference");
   return scene;
 }

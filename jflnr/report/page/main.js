@@ -19,7 +19,13 @@ const loaded = new Map();
 async function showScene(index) {
   $("scene").value = index;
   $("unpacking").hidden = loaded.has(index);
-  if (!loaded.has(index)) loaded.set(index, await loadScene(CONTENT.scenes[index]));
+  $("trouble").hidden = true;
+  try {
+    if (!loaded.has(index)) loaded.set(index, await loadScene(CONTENT.scenes[index]));
+  } catch (error) {
+    return trouble(error.message);
+  }
+  if (Number($("scene").value) !== index) return; // another one was chosen meanwhile
   const scene = (state.scene = loaded.get(index));
   // The same names as before, so that flipping between scenes compares like with like.
   const named = (image) => scene.images.find((other) => other.name === image?.name);
@@ -27,10 +33,22 @@ async function showScene(index) {
   state.right = named(state.right) ?? scene.images.at(-1);
   $("unpacking").hidden = true;
   $("viewer").hidden = false;
+  buildLists();
+  fit();
+}
+
+function trouble(text) {
+  $("trouble").textContent = text;
+  $("trouble").hidden = false;
+  $("unpacking").hidden = true;
+}
+
+/** What there is one of for each image of the scene. */
+function buildLists() {
   buildPanel();
   buildCrops();
   buildMetrics();
-  fit();
+  document.dispatchEvent(new Event("scene"));
 }
 
 function stepScene(by) {
@@ -38,23 +56,28 @@ function stepScene(by) {
   return showScene((Number($("scene").value) + by + count) % count);
 }
 
+function listScene({ name }, index) {
+  $("scene").append(element("option", { value: index }, name));
+  $("scene-label").hidden = index < 1;
+}
+
 async function start() {
   buildHelp();
   buildTables();
-  if (!CONTENT.scenes.length) return;
-  $("scene").append(
-    ...CONTENT.scenes.map((scene, i) => element("option", { value: i }, scene.name)),
-  );
-  $("scene-label").hidden = CONTENT.scenes.length < 2;
+  CONTENT.scenes.forEach(listScene);
   $("scene").addEventListener("change", () => showScene(Number($("scene").value)));
+  if (CONTENT.scenes.length) await begin(0);
+}
+
+/** Show the first scene, and listen. */
+async function begin(index) {
+  await showScene(index);
+  if (!state.scene) return;
   listenToControls();
-  await showScene(0);
   listenToPointers();
   document.addEventListener("keydown", onKey);
   new ResizeObserver(() => refresh()).observe($("stage"));
 }
 
-if (typeof DecompressionStream === "undefined") {
-  $("trouble").textContent = "This page needs a browser of 2023 or newer.";
-  $("trouble").hidden = false;
-} else start();
+if (typeof DecompressionStream === "undefined") trouble("This page needs a browser of 2023 or newer.");
+else start();

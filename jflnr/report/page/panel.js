@@ -49,9 +49,14 @@ function buildPanel() {
   );
   $("view").parentElement.hidden = views.length < 2;
   if (!views.includes(state.view)) state.view = views[0];
-  $("map").parentElement.hidden = !scene.reference;
-  $("map").options[2].disabled = !scene.images.some((image) => image.flip);
-  if (!scene.reference) state.map = "image";
+  const there = (map) => scene.images.some((image) => mapShown(scene, image, map) === map);
+  const maps = Object.entries(MAPS).filter(([map]) => there(map));
+  $("map").replaceChildren(
+    element("option", { value: "image" }, "image"),
+    ...maps.map(([map, { name }]) => element("option", { value: map }, name)),
+  );
+  $("map").parentElement.hidden = !maps.length;
+  if (!there(state.map)) state.map = "image";
   $("images").replaceChildren(
     ...scene.images.map((image, i) => {
       const pick = { type: "button", className: "left", onclick: () => choose("left", image) };
@@ -106,7 +111,7 @@ function pixelText(scene, image, [x, y]) {
   const text = [0, 1, 2].map((c) => number(values[at + c * count])).join("  ");
   if (!scene.reference || image === scene.reference) return text;
   const error = `\nerror ${number(errorOf(scene, image)[at])}`;
-  return text + error + (image.flip ? `  FLIP ${number(image.flip[at] / 255)}` : "");
+  return text + error + (image.maps.flip ? `  FLIP ${number(image.maps.flip[at] / 255)}` : "");
 }
 
 function number(value) {

@@ -27,14 +27,25 @@ function magma(share) {
 const ERROR_RANGE = [-4, 1];
 const MAPS = {
   error: {
+    name: "relative squared error",
     title: "relative squared error of the reflected indirect light (logarithmic)",
     labels: ["1e-4", "1e-3", "0.01", "0.1", "1", "10"],
     share: (v) => (Math.log10(v) - ERROR_RANGE[0]) / (ERROR_RANGE[1] - ERROR_RANGE[0]),
   },
   flip: {
+    name: "FLIP",
     title: "FLIP of the reflected indirect light, at the exposure of the metrics",
     labels: ["0", "0.2", "0.4", "0.6", "0.8", "1"],
-    share: (v) => v / 255,
+  },
+  told: {
+    name: "error told by the method",
+    title: "standard error that the method tells, over the mean brightness (logarithmic)",
+    labels: ["1e-3", "0.01", "0.1", "1", "10"],
+  },
+  plan: {
+    name: "where it is refined",
+    title: "where method auto fits its finest models",
+    labels: ["not refined", "refined"],
   },
 };
 
@@ -86,7 +97,7 @@ function canvasOf(scene, image, { view, map, tone, stops }) {
     const table = toneTable(scene.exposures[view] * 2 ** stops, tone);
     paintRadiance(data.data, radianceOf(scene, image, view), table);
   } else if (shown === "error") paintMap(data.data, errorOf(scene, image), MAPS.error.share);
-  else paintMap(data.data, image.flip, MAPS.flip.share);
+  else paintMap(data.data, image.maps[shown], (v) => v / 255);
   context.putImageData(data, 0, 0);
   image.canvases[shown] = { key, canvas };
   return canvas;
@@ -94,6 +105,6 @@ function canvasOf(scene, image, { view, map, tone, stops }) {
 
 /** The map to show of this image; the reference and what has no map are shown themselves. */
 function mapShown(scene, image, map) {
-  if (map === "error" && scene.reference && image !== scene.reference) return "error";
-  return map === "flip" && image.flip ? "flip" : "image";
+  const there = map === "error" ? scene.reference && image !== scene.reference : image.maps[map];
+  return there ? map : "image";
 }
