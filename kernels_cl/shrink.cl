@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Means over factor x factor pixels, of those in the mask only: guides at the resolution of light that
 // is smaller (section 3.2.1).
 //

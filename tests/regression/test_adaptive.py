@@ -153,8 +153,9 @@ def test_wrong_arguments_are_named(scene):
         uncompiled(y, x[:4], AdaptiveFLR())
     with pytest.raises(ValueError, match="guides_map must be a whole number of times larger"):
         uncompiled(y, x, AdaptiveFLR(), guides_map=jnp.concatenate([x, x]))
+    twice = 2 * y.shape[0], 2 * y.shape[1], 5
     with pytest.raises(ValueError, match="method flnr needs guides_map at the size of target"):
-        flnr(jnp.tile(y[..., :1], 3), x, guides_map=jnp.concatenate([x, x]).repeat(2, 1))
+        flnr(jnp.tile(y[..., :1], 3), jnp.ones((*y.shape[:2], 5)), guides_map=jnp.ones(twice))
     with pytest.raises(ValueError, match="caution"):
         AdaptiveFLR(caution=-1)
 
