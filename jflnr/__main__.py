@@ -17,6 +17,9 @@ INTERRUPTED = 130
 ENDING = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 # Bytes of compiled programs that are kept; the oldest go first.
 PROGRAMS = 1 << 28
+# An option of XLA with which it compiles in two thirds of the time, and the first version that may
+# lack it: of one that it does not know it dies.
+QUICK, TRIED = "--xla_cpu_use_fusion_emitters=false", (0, 11)
 # Objects between looks for garbage: imports and traces of JAX make hundreds of thousands that stay,
 # and looking through them every 700 takes a tenth of a second run's time.
 OBJECTS = 100_000
@@ -50,10 +53,12 @@ def _open_streams() -> None:
 
 
 def _keep_programs() -> None:
-    """Let JAX keep what it compiles for later runs, unless its own variables say otherwise.
+    """Let JAX compile quickly, and keep it for later runs, unless its own variables say otherwise.
 
     Half a minute becomes a few seconds. What XLA says of each program it loads is not for users.
     """
+    from importlib.metadata import version
+
     import platformdirs
 
     kept = os.path.join(platformdirs.user_cache_dir("jflnr"), "jax")
@@ -61,6 +66,8 @@ def _keep_programs() -> None:
     os.environ.setdefault("JAX_COMPILATION_CACHE_MAX_SIZE", str(PROGRAMS))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    if tuple(map(int, version("jaxlib").split(".")[:2])) < TRIED:
+        os.environ.setdefault("XLA_FLAGS", QUICK)
 
 
 def _watch() -> None:
