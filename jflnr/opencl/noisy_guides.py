@@ -8,6 +8,9 @@ from jflnr.opencl.arguments import to_layers
 from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.moments import guide_arguments, guide_defines
 
+# Rows that one work-item goes down: of one more on each side it needs the mean too.
+TALL = 10
+
 
 @one_sentence()
 def smooth_guide(guide: Any, normal: Any, depth: Any, context: Context | None = None) -> Any:
@@ -17,9 +20,8 @@ def smooth_guide(guide: Any, normal: Any, depth: Any, context: Context | None = 
     height, width = normal.shape[:2]
     lanes = context.width()
     defines = {**guide_defines(layers, 1), "WIDTH": lanes}
-    rows, smooth = context.empty((height, width, 1)), context.empty((height, width, 1))
-    arguments = (width, height, 1 / NORMAL, DEPTH, *guide_arguments(layers))
-    size = -(-width // lanes), height
-    context.run("smooth_rows", "noisy_guides.cl", defines, size, (*arguments, rows))
-    context.run("smooth_columns", "noisy_guides.cl", defines, size, (*arguments, rows, smooth))
+    smooth = context.empty((height, width, 1))
+    size = -(-width // lanes), -(-height // TALL)
+    arguments = width, height, TALL, 1 / NORMAL, DEPTH, *guide_arguments(layers), smooth
+    context.run("smooth", "noisy_guides.cl", defines, size, arguments)
     return smooth
