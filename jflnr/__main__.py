@@ -57,8 +57,6 @@ def _keep_programs() -> None:
 
     Half a minute becomes a few seconds. What XLA says of each program it loads is not for users.
     """
-    from importlib.metadata import version
-
     import platformdirs
 
     kept = os.path.join(platformdirs.user_cache_dir("jflnr"), "jax")
@@ -66,8 +64,14 @@ def _keep_programs() -> None:
     os.environ.setdefault("JAX_COMPILATION_CACHE_MAX_SIZE", str(PROGRAMS))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
-    if tuple(map(int, version("jaxlib").split(".")[:2])) < TRIED:
-        os.environ.setdefault("XLA_FLAGS", QUICK)
+    os.environ.setdefault("XLA_FLAGS", quickly())
+
+
+def quickly() -> str:
+    """The option with which this machine's XLA compiles in less time, or none."""
+    from importlib.metadata import version
+
+    return QUICK if tuple(map(int, version("jaxlib").split(".")[:2])) < TRIED else ""
 
 
 def _watch() -> None:

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 import pytest
 
+from jflnr.__main__ import quickly
 from jflnr.frame import Frame, write_frame
 from jflnr.methods import BACKENDS
 
@@ -17,7 +18,7 @@ def pytest_configure(config: pytest.Config) -> None:
     # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
     config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
     # Tests wait for the compiler, not for what it makes; so do the processes that they start.
-    quick = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
+    quick = f"--xla_backend_optimization_level=0 {quickly()}"
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}"
     # Many tests need the same programs, and those of FLNR take a minute to compile: workers and
     # later runs take them from a folder. Processes that tests start find it in their environment.
