@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from jflnr.frame import Array, Frame
 from jflnr.images.noisy_guides import antialiased, holds_light, smooth_guide
+from jflnr.lazy import jnp
 
 DEFAULT = ("normal", "depth", "ao")
 NAMES = ("normal", "depth", "ao", "position", "albedo")
@@ -122,9 +125,14 @@ def draw_near(depth: Array) -> Array:
     Where a room is seen into the open through a slit, the models of the blocks around, which know
     nothing so far away, would be extrapolated and leave bright streaks.
     """
-    xp = depth.__array_namespace__()
-    beyond = xp.maximum(depth - FAR, 0)
-    return xp.minimum(depth, FAR) + beyond / (1 + beyond)
+    bent = lambda beyond: FAR + beyond / (1 + beyond)
+    if not isinstance(depth, np.ndarray):
+        return jnp.where(depth > FAR, bent(jnp.maximum(depth - FAR, 0)), depth)
+    if not (far := depth > FAR).any():  # few pixels are, if any
+        return depth
+    near = depth.copy()
+    near[far] = bent(depth[far] - FAR)
+    return near
 
 
 def shrink(image: Array, factor: int, mask: Array | None = None) -> Any:
