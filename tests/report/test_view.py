@@ -16,6 +16,7 @@ import pytest
 
 import jflnr
 from jflnr.cli import main
+from tests.report.pages import check_axe, opened
 
 READY = "#versions tbody tr:nth-child({})"
 
@@ -66,16 +67,11 @@ def viewed(folder: Path) -> Iterator[Viewed]:
 
 @pytest.fixture
 def page(browser: Any, viewed: Viewed) -> Iterator[Any]:
-    """The page of a folder without a frame; errors of the console fail the test."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900}, bypass_csp=True)
-    page, errors = context.new_page(), []
-    page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(viewed.url)
-    page.wait_for_selector("#asked")
-    yield page
-    context.close()
-    assert not errors
+    """The page of a folder without a frame."""
+    size = {"width": 1280, "height": 900}
+    with opened(browser, viewed.url, viewport=size, bypass_csp=True) as page:
+        page.wait_for_selector("#asked")
+        yield page
 
 
 @pytest.fixture
@@ -132,16 +128,10 @@ def test_a_method_is_switched_and_a_folder_followed(
 
 
 def test_no_serious_finding_of_axe(page: Any, render: Callable[[str], Path]) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    for count in range(2):
-        found = axe.Axe().run(page).response["violations"]
-        serious = [v for v in found if v["impact"] in ("serious", "critical")]
-        assert not serious, json.dumps(
-            [(v["id"], [n["html"] for n in v["nodes"]]) for v in serious], indent=1
-        )
-        if count == 0:
-            render("f.exr")
-            page.wait_for_selector(READY.format(1))
+    check_axe(page)
+    render("f.exr")
+    page.wait_for_selector(READY.format(1))
+    check_axe(page)
 
 
 def test_the_page_obeys_its_own_policy(browser: Any, viewed: Viewed, render: Any) -> None:
