@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # What a history depends on.
 OPTIONS = (
-    "method", "spp", "map", "guides", "params", "sigma", "eps", "eps_prime", "block"
+    "method", "spp", "map", "guides", "params", "sigma", "eps", "eps_prime", "block", "worth"
 )  # fmt: skip
 
 UNKNOWN_MOTION = "Without a layer motion and a camera, everything is taken to stand still."
@@ -108,7 +108,7 @@ class ShotDenoiser:
             return None
         found = history.read(self.history)
         for name, value in _options(self.worker.arguments).items():
-            if (other := found.about["options"].get(name)) != value:
+            if (other := found.about["options"].get(name, "None")) != value:
                 raise ValueError(
                     f"{self.history} was made with --{name.replace('_', '-')} {other}, and this is "
                     f"{value}: delete it, or name another file"

@@ -46,11 +46,9 @@ class Scene:
 
     def radiance(self, image: np.ndarray) -> np.ndarray:
         """What is measured, (H, W, 3) float64: the light that `image` reflects, or itself."""
-        return (
-            np.asarray(image, np.float64)
-            if self.frame is None
-            else metrics.reflected(self.frame, image)
-        )
+        if self.frame is None:
+            return np.asarray(image, np.float64)
+        return metrics.reflected(self.frame, image)
 
     def measure(self, name: str) -> dict[str, float | None]:
         """The metrics of version `name` against the reference."""

@@ -16,6 +16,7 @@ import pytest
 
 import jflnr
 from jflnr.cli import main
+from jflnr.methods import method_of
 from tests.report.pages import check_axe, opened
 
 READY = "#versions tbody tr:nth-child({})"
@@ -112,11 +113,24 @@ def test_a_method_is_switched_and_a_folder_followed(
     name = "auto, without ao, blocks of 16 pixels"
     row = page.locator("#versions tbody tr").last
     assert name in row.inner_text() and " ms" in row.inner_text()
-    assert "of the frame, in tiles of 64 pixels" in row.inner_text()
+    assert "refined: 100% of the frame, in tiles of 64 pixels" in row.inner_text()
     assert row.locator("canvas").count() == 3
     expected = np.asarray(jflnr.denoise(frame, "auto", guides=("normal", "depth"), block=16))
     np.testing.assert_allclose(light_of(page, name), expected, rtol=2e-3, atol=2e-3)
     page.select_option("#map", "told")
+
+    page.fill("#worth", "1")
+    assert page.inner_text("#worth-text") == "100 % signal"
+    page.click("#asked button")
+    page.wait_for_selector(READY.format(3))
+    coarse = "auto, from 100 % signal, without ao, blocks of 16 pixels"
+    row = page.locator("#versions tbody tr").last.inner_text()
+    assert coarse in row and "refined: 0% of the frame" in row
+    method = method_of("auto", worth=1.0, block=16)
+    expected = np.asarray(jflnr.denoise(frame, method, guides=("normal", "depth")))
+    np.testing.assert_allclose(light_of(page, coarse), expected, rtol=2e-3, atol=2e-3)
+    page.select_option("#method", "flr")
+    assert page.locator("#worth").is_hidden()
 
     render("f_10.exr")
     page.wait_for_function("state.scene.name === 'f_10.exr' && state.left.name !== 'noisy'")
@@ -125,6 +139,20 @@ def test_a_method_is_switched_and_a_folder_followed(
     render("f_11.exr")
     page.wait_for_selector("#scene option:nth-child(3)", state="attached")
     assert page.evaluate("state.scene.name") == "f_10.exr"
+
+
+def test_a_phone_needs_no_sideways_scrolling(
+    browser: Any, viewed: Viewed, render: Callable[[str], Path]
+) -> None:
+    """With every control shown, and a version denoised."""
+    size = {"width": 390, "height": 844}
+    with opened(browser, viewed.url, viewport=size, bypass_csp=True) as page:
+        render("f.exr")
+        page.wait_for_selector(READY.format(1))
+        page.select_option("#method", "auto")
+        assert page.locator("#worth").is_visible()
+        widths = "[document.documentElement, $('versions')].map(e => e.scrollWidth - e.clientWidth)"
+        assert page.evaluate(widths) == [0, 0]
 
 
 def test_no_serious_finding_of_axe(page: Any, render: Callable[[str], Path]) -> None:
