@@ -1,6 +1,7 @@
 """A shot in the page: its frames at their rate, and the warped error of each."""
 
 import dataclasses
+import json
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -115,6 +116,7 @@ def test_it_is_played_by_key_button_and_slider(page: Any) -> None:
     assert not playing()
     page.focus("#frame")
     page.evaluate("setFrame(0)")
+    settle(page)
     press(page, "ArrowRight")
     assert page.evaluate("state.frame") == 1 and not playing()
     press(page, " ")
@@ -207,3 +209,23 @@ def test_what_makes_no_shot_is_said_in_one_sentence(
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
     assert not (folder / "shot.html").exists()
+
+
+@pytest.mark.parametrize("noisy", ["indirect_1", "beauty_1"])
+def test_motion_comes_from_cameras(noisy: str, folder: Path, frame: Frame) -> None:
+    """Also of whole pictures; here neither moves nor changes."""
+    camera = {"camera_to_world": np.eye(4).tolist(), "fov_x_degrees": 60}
+    paths = [folder / "shot" / name for name in NAMES]
+    for path in paths:
+        write_frame(path, dataclasses.replace(frame, motion=None), header=camera)
+        channels = exr.read_channels(path)
+        for name, old in (
+            (noisy, "reference"),
+            ("seen_albedo_1", "albedo"),
+            ("normal_1", "normal"),
+        ):
+            copied = [n for n in channels if n.startswith(f"{old}.")]
+            channels |= {n.replace(old, name): channels[n] for n in copied}
+        exr.write_channels(path, channels, json.dumps(camera))
+    first, *_ = shot_data(collect_shot(paths, 1))["images"]
+    assert first["warped"][0] is None and first["warped"][1:] == pytest.approx((0, 0), abs=1e-3)
