@@ -9,15 +9,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-import jax
 import numpy as np
 
-from jflnr import checks
 from jflnr.frame import Array, Frame
-from jflnr.metrics import display, exposure, psnr, ssim, unbiased_mse
-from jflnr.temporal.reproject import Surface, Taps, find_taps, gather
+from jflnr.metrics import display, exposure, psnr, reflected, ssim, unbiased_mse
+from jflnr.temporal.flicker import luminance, taps_between, warped_change, warped_error
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Lag compares means over squares of so many pixels: what noise is left there is small.
 SQUARE = 8
 # Steps of the lag that is searched for.
@@ -27,8 +24,6 @@ AGES = {"0": (0, 1), "1 to 3": (1, 4), "4 to 7": (4, 8), "8 and more": (8, np.in
 
 # What moves less, in pixels, stands still.
 STILL = 0.3
-
-_find_taps = jax.jit(find_taps)
 
 
 def measure_sequence(frames: Sequence[Frame], lights: Sequence[Array]) -> list[dict]:
@@ -68,7 +63,7 @@ def _measure(frame: Frame, light: Array, scale: float) -> dict[str, float | None
 
 def sequence_exposure(frames: Sequence[Frame]) -> float:
     """The factor that brings the mean of all references to 0.35."""
-    return exposure(np.stack([_reflected(frame, frame.reference) for frame in frames]))
+    return exposure(np.stack([reflected(frame, np.asarray(frame.reference)) for frame in frames]))
 
 
 def temporal_error(frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float) -> float:
@@ -76,18 +71,10 @@ def temporal_error(frames: tuple[Frame, Frame], lights: tuple[Array, Array], sca
 
     It contains what truly changes: compare it with that of the references.
     """
-    before, now = (_shown(frame, light, scale) for frame, light in zip(frames, lights, strict=True))
+    before, now = (
+        luminance(frame, light, scale) for frame, light in zip(frames, lights, strict=True)
+    )
     return float(np.mean(np.abs(now - before)))
-
-
-def warped_error(frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float) -> float:
-    """The same, with the light of the first frame moved to where its surfaces are in the second.
-
-    Of the pixels that both frames show; NaN if there are none. Both lights are multiplied by the
-    second frame's albedo, so that neither motion nor the resampling of a texture counts.
-    """
-    change = _warped_change(frames, lights, scale)
-    return float(np.mean(np.abs(change))) if change.size else float("nan")
 
 
 def false_change(
@@ -101,29 +88,8 @@ def false_change(
     if any(frame.reference_a is None for frame in frames):
         return None
     pairs = lights, *zip(*(_halves(frame) for frame in frames), strict=True)
-    change, true_a, true_b = (_warped_change(frames, pair, scale) for pair in pairs)
+    change, true_a, true_b = (warped_change(frames, pair, scale) for pair in pairs)
     return float(np.mean((change - true_a) * (change - true_b))) if change.size else None
-
-
-def _warped_change(
-    frames: tuple[Frame, Frame], lights: tuple[Array, Array], scale: float
-) -> np.ndarray:
-    """Changes of luminance, of the pixels that both frames show, `(n,)`."""
-    before, now = frames
-    taps = taps_between(before, now)
-    seen = np.asarray(taps.seen)[..., 0]
-    if now.mask is not None:
-        seen = seen & (np.asarray(now.mask)[..., 0] > 0)
-    moved = np.asarray(gather(taps, np.asarray(lights[0], np.float32)))
-    return (_shown(now, lights[1], scale) - _shown(now, moved, scale))[seen]
-
-
-def taps_between(before: Frame, now: Frame) -> Taps:
-    """Where the pixels of a frame were in the one before. Raises ValueError without motion."""
-    if now.motion is None:
-        raise ValueError("the frame has no layer motion, so it cannot be compared with the last")
-    checks.same_size(before=before.normal, now=now.normal)
-    return _find_taps(now.motion, Surface.of(now), Surface.of(before))
 
 
 def lag(lights: Array, references: Array) -> float:
@@ -216,17 +182,8 @@ def _psnr(errors: np.ndarray) -> float | None:
     return float(-10 * np.log10(mean)) if mean > 0 else None
 
 
-def _reflected(frame: Frame, light: Array | None) -> np.ndarray:
-    return np.asarray(frame.albedo, np.float64) * np.asarray(light, np.float64)
-
-
 def _displayed(frame: Frame, light: Array | None, scale: float) -> np.ndarray:
-    return display(_reflected(frame, light), scale)
-
-
-def _shown(frame: Frame, light: Array, scale: float) -> np.ndarray:
-    """Luminance of the displayed picture, `(H, W)`."""
-    return _displayed(frame, light, scale) @ LUMINANCE
+    return display(reflected(frame, np.asarray(light)), scale)
 
 
 def _squares(images: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import functools
 import io
+import itertools
 import os
 import struct
 import tempfile
@@ -120,8 +121,8 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
 
 def check_aligned(*paths: PathLike) -> None:
     """Raise ValueError unless the pixels of all files are those of the same data window."""
-    (first, origin), *others = [(path, read_attributes(path).window.origin) for path in paths]
-    for other, start in others:
+    starts = [(path, read_attributes(path).window.origin) for path in paths]
+    for (first, origin), (other, start) in itertools.pairwise(starts):
         if start != origin:
             raise ValueError(
                 f"{first} starts at pixel {origin} and {other} at {start}: "

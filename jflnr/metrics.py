@@ -39,6 +39,15 @@ def display(picture: np.ndarray, scale: float) -> np.ndarray:
     return np.clip(picture * scale, 0, 1) ** (1 / GAMMA)
 
 
+def reflected(frame: Frame, light: Array) -> np.ndarray:
+    """What is measured of a frame's version, `(H, W, 3)` float64: the demodulated `light` times the
+    albedo; of another program's picture, itself."""
+    if frame.beauty is not None:
+        return _float64(light)
+    with np.errstate(invalid="ignore"):  # black times infinite
+        return _float64(frame.albedo) * _float64(light)
+
+
 def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
     """All metrics of demodulated `indirect` (H, W, 3) against the frame's own reference; of a frame
     with a `beauty`, of a picture against another.
@@ -53,13 +62,11 @@ def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
     checks.same_size(indirect=indirect, reference=frame.reference)
     if frame.beauty is not None:
         return compare(indirect, frame.reference)
-    albedo, reference = _float64(frame.albedo), _float64(frame.reference)
-    with np.errstate(invalid="ignore"):  # black times infinite
-        x, y = albedo * _float64(indirect), albedo * reference
+    x, y = reflected(frame, indirect), reflected(frame, frame.reference)
     result = compare(x, y)
     result["mse_unbiased"] = None
     if frame.reference_a is not None:
-        half = albedo * _float64(frame.reference_a)
+        half = reflected(frame, frame.reference_a)
         result["mse_unbiased"] = unbiased_mse(x, half, 2 * y - half)
     return result
 

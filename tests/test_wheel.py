@@ -1,5 +1,6 @@
 """The built wheel, installed where nothing else is: it holds all it needs, and works."""
 
+import shutil
 import subprocess
 import tomllib
 import venv
@@ -50,6 +51,27 @@ def test_the_wheel_holds_all_that_is_not_python(clean: Path) -> None:
     held = set(zipfile.ZipFile(wheel).namelist())
     assert {"jflnr/py.typed", "jflnr/data/room.exr", "jflnr/kernels_cl/solve.cl"} <= held
     assert wanted <= held
+
+
+@pytest.mark.slow
+def test_builds_are_reproducible(
+    clean: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wheel and sdist, of the same files at another place, with other times and permissions."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    python = clean / "venv" / "bin" / "python"
+    run(python, "-m", "pip", "--quiet", "install", "hatchling", cwd=clean)
+    listed = run("git", "ls-files", "-co", "--exclude-standard", cwd=REPOSITORY).split()
+    for name in reversed(listed):
+        (tmp_path / name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        copy = Path(shutil.copy(REPOSITORY / name, tmp_path / name))
+        copy.chmod(copy.stat().st_mode & 0o700)
+    built = []
+    for place in (REPOSITORY, tmp_path):
+        out = clean / f"of {place.name}"
+        run(python, "-m", "hatchling", "build", "-d", out, cwd=place)
+        built.append({path.name: path.read_bytes() for path in out.iterdir()})
+    assert len(built[0]) == 2 and built[0] == built[1]
 
 
 @pytest.mark.slow

@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --method auto: print how much it refines, and write a map, OUT.plan.png",
     )
+    add("--worth", type=float, help="with auto: least share of signal to refine a tile for (0.6)")
     add(
         "--backend",
         default=AUTO,

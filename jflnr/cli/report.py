@@ -6,6 +6,9 @@ and maps the errors where there is a reference: the frame's own or --map referen
 pictures, also those of other programs' files, --reference.
 
 A version is named by its file, or by its folder where the file is named like the frame.
+
+With --temporal a folder of frames and those that `jflnr denoise` wrote from it are a shot: the page
+plays it, in 8 bits and at the frames' rate, with the warped error of each frame.
 """
 
 import argparse
@@ -17,6 +20,7 @@ EXAMPLES = """\
   jflnr report room.exr out/room.exr -o report.html     a frame and what was denoised from it
   jflnr report render.exr out/render.exr --reference converged.exr -o report.html
   jflnr report a.exr b.exr --reference c.exr -o r.html  plain pictures
+  jflnr report shot/ clean/ --temporal -o shot.html     a film that plays
 """
 
 
@@ -27,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--spp", type=int, default=1, metavar="N", help="noisy layer indirect_N of a frame (1)")
     add_map(parser)
     add("--reference", metavar="FILE", type=Path, help="what pictures are measured against")
+    add("--temporal", action="store_true", help="play the frames of a folder: it is a shot")
     add("--title", help="heading of the page (the scenes' names)")
     add("--overwrite", action="store_true", help="replace OUT if it exists")
 
@@ -34,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.cli.jobs import borrowed, check_apart, expand, make_folder
     from jflnr.report.page import write_report
-    from jflnr.report.scenes import collect
+    from jflnr.report.scenes import Scene, collect
+    from jflnr.report.shot import Shot, collect_shot
 
     output = arguments.output
     if output.is_dir():
@@ -44,7 +50,16 @@ def run(arguments: argparse.Namespace) -> int:
     if output.exists() and not arguments.overwrite:
         print(kept_as_it_is(output))
         return 0
-    scenes = collect(paths, arguments.spp, arguments.reference, dict(arguments.map))
+    layers, scenes = dict(arguments.map), list[Scene | Shot]()
+    if not arguments.temporal:
+        scenes += collect(paths, arguments.spp, arguments.reference, layers)
+    elif arguments.reference is None:
+        scenes.append(collect_shot(paths, arguments.spp, layers))
+    else:
+        raise ValueError(
+            "--reference is one picture, and a shot has one for each frame: "
+            "--map reference=FOLDER/{stem}.exr"
+        )
     make_folder(output)
     title = arguments.title or ", ".join(scene.name for scene in scenes)
     write_report(output, scenes, title)

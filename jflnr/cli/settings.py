@@ -25,13 +25,16 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
         raise ValueError(f"--error-map needs --method {', '.join(told)}")
     if arguments.profile and backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
-    if arguments.explain and name != "auto":
-        raise ValueError("--explain tells what --method auto chose, so it needs that method")
-    given = {n: getattr(arguments, n) for n in ("sigma", "eps", "eps_prime", "block")}
+    for option in ("explain", "worth"):
+        if getattr(arguments, option) not in (None, False) and name != "auto":
+            raise ValueError(
+                f"--{option} is about where --method auto refines: it needs that method"
+            )
+    given = {n: getattr(arguments, n) for n in ("sigma", "eps", "eps_prime", "block", "worth")}
     options = {n: value for n, value in given.items() if value is not None}
     if name is None:
         return {"method": None, "backend": backend, **options}
-    if name != "flr" and (odd := options.keys() - {"block"}):
+    if name != "flr" and (odd := options.keys() - {"block", "worth"}):
         option = min(odd).replace("_", "-")
         raise ValueError(f"--{option} is for --method flr; {name} finds its own")
     method, about = method_of(name), dict[str, Any]()

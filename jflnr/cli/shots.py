@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # What a history depends on.
 OPTIONS = (
-    "method", "spp", "map", "guides", "params", "sigma", "eps", "eps_prime", "block"
+    "method", "spp", "map", "guides", "params", "sigma", "eps", "eps_prime", "block", "worth"
 )  # fmt: skip
 
 UNKNOWN_MOTION = "Without a layer motion and a camera, everything is taken to stand still."
@@ -108,7 +108,7 @@ class ShotDenoiser:
             return None
         found = history.read(self.history)
         for name, value in _options(self.worker.arguments).items():
-            if (other := found.about["options"].get(name)) != value:
+            if (other := found.about["options"].get(name, "None")) != value:
                 raise ValueError(
                     f"{self.history} was made with --{name.replace('_', '-')} {other}, and this is "
                     f"{value}: delete it, or name another file"
@@ -135,8 +135,10 @@ class _Running:
             return loaded
         if loaded.source is None or loaded.frame is None:
             return failure(job, ValueError("a shot needs whole frames in memory: raise --memory"))
+        from jflnr.temporal.camera import with_motion
+
         header, self.header = self.header, loaded.source.header
-        return loaded._replace(frame=_with_motion(loaded.frame, self.header, header))
+        return loaded._replace(frame=with_motion(loaded.frame, self.header, header))
 
     def denoise(self, loaded: Loaded | Record) -> tuple[Denoised | Record, Any]:
         """The denoised frame, and the state after it."""
@@ -202,13 +204,3 @@ def _frames_in(before: History, shot: Sequence[Job]) -> int:
         if job.source.exists() and _identity(job.source) == before.about["last"]:
             return i + 1
     return 0
-
-
-def _with_motion(frame: Frame, header: dict[str, Any], before: dict[str, Any]) -> Frame:
-    """The frame with motion from its camera and the last frame's, if it has none and they do."""
-    from jflnr.temporal import Camera, camera_motion
-
-    camera, last = Camera.of(header), Camera.of(before)
-    if frame.motion is not None or camera is None or last is None:
-        return frame
-    return dataclasses.replace(frame, motion=np.asarray(camera_motion(frame.depth, camera, last)))

@@ -1,9 +1,9 @@
 """view: look at frames in a browser, denoise them on demand, follow a renderer.
 
 Serves the report's page to this machine's browsers only, until Ctrl-C, and writes no file. The page
-denoises a frame by other methods, guides, blocks and back ends, and shows their times, maps of
-errors and, of method auto, where it refines, side by side. Frames that come into a folder, or
-change, are shown and denoised as they come.
+denoises a frame by other methods, budgets, guides, blocks and back ends, and shows their times,
+maps of errors and, of method auto, where it refines, side by side. Frames that come into a folder,
+or change, are shown and denoised as they come.
 """
 
 import argparse
@@ -36,7 +36,7 @@ EXAMPLES = """\
 """
 
 # What a page may ask to be denoised by: options of `jflnr denoise`.
-OPTIONS = ("method", "guides", "block", "backend")
+OPTIONS = ("method", "worth", "guides", "block", "backend")
 # The page's own scripts and styles, and this server; no other page may show it in itself.
 POLICY = "default-src 'unsafe-inline' 'self' data:; frame-ancestors 'none'"
 
@@ -110,6 +110,7 @@ class Frames:
         from jflnr.report import page
 
         choices = {"methods": [*HOMES], "backends": [AUTO, *BACKENDS]}
+        choices["worth"] = method_of("auto").worth
         script = page.read("view.js")
         content = page.content([]) | {"view": choices}
         return page.page(self.path.resolve().name, content, f"<script>\n{script}</script>")

@@ -43,7 +43,8 @@ def samples_of(
 def told_samples(layout: Layout, attributes: Attributes) -> int | None:
     """Samples per pixel as the file's header or names tell them."""
     if layout.program == "jflnr":
-        return int(layout.channels["beauty"][0].removeprefix("beauty_").removesuffix(".R"))
+        own = re.fullmatch(r"beauty_(\d+)\.R", layout.channels["beauty"][0])
+        return int(own[1]) if own else None
     for name, value in attributes.others.items():
         if name == "samplesPerPixel" or re.fullmatch(r"cycles\..*\.samples", name):
             return int(value) if str(value).isdigit() else None

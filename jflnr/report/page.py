@@ -17,14 +17,24 @@ from jflnr.frame import HALF_MAX, Frame
 from jflnr.metrics import LABELS, RELATIVE_EPSILON, display, exposure, flip_map
 from jflnr.report.crops import find_crops
 from jflnr.report.scenes import REFERENCE, Scene
+from jflnr.report.shot import Shot, shot_data
 
-SCRIPTS = ("data.js", "tone.js", "viewer.js", "panel.js", "keys.js", "tables.js", "main.js")
-LOWER_IS_BETTER = ("flip", "rmse", "smape", "mse", "mse_unbiased", "ms")
+SCRIPTS = (
+    "data.js",
+    "tone.js",
+    "viewer.js",
+    "panel.js",
+    "player.js",
+    "keys.js",
+    "tables.js",
+    "main.js",
+)
+LOWER_IS_BETTER = ("flip", "rmse", "smape", "mse", "mse_unbiased", "ms", "warped")
 
 
 def write_report(
     path: Path,
-    scenes: Sequence[Scene],
+    scenes: Sequence[Scene | Shot],
     title: str,
     tables: Sequence[Mapping[str, Any]] = (),
     extra: str = "",
@@ -39,12 +49,15 @@ def write_report(
     write_atomically(path, text.encode(errors="replace"))  # names of files need not be UTF-8
 
 
-def content(scenes: Sequence[Scene], tables: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+def content(
+    scenes: Sequence[Scene | Shot], tables: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
     """What the page shows, as values of JavaScript."""
+    data = [shot_data(each) if isinstance(each, Shot) else scene_data(each) for each in scenes]
     return {
-        "scenes": [scene_data(scene) for scene in scenes],
+        "scenes": data,
         "tables": list(tables),
-        "labels": LABELS | {"ms": "ms"},
+        "labels": LABELS | {"ms": "ms", "warped": "mean warped error"},
         "lower": LOWER_IS_BETTER,
         "epsilon": RELATIVE_EPSILON,
     }
@@ -75,7 +88,7 @@ def script_data(content: Mapping[str, Any]) -> str:
 def scene_data(scene: Scene) -> dict[str, Any]:
     """What the page needs to know of one scene, as JSON values."""
     unit = unit_of(scene)
-    layers = {} if scene.frame is None else _layers(scene.frame, unit)
+    layers = {} if scene.frame is None or scene.whole else _layers(scene.frame, unit)
     return {
         "name": scene.name,
         "height": scene.size[0],
@@ -127,26 +140,21 @@ def _layers(frame: Frame, unit: float) -> dict[str, str]:
 
 def unit_of(scene: Scene) -> float:
     """A power of two near the mean light, so that dividing by it is exact and suits half floats."""
-    image = _judge(scene)
+    image = scene.judge
     mean = float(np.mean(np.abs(image[np.isfinite(image)]), dtype=np.float64))
     return 2.0 ** round(np.log2(mean)) if 0 < mean < np.inf else 1.0
 
 
 def _exposures(scene: Scene) -> dict[str, float]:
     """The factor that each view is shown with: the metrics' rule, on what reflects."""
-    judge = _judge(scene)
+    judge = scene.judge
     lights = {"reflected": scene.radiance(judge)}
-    if scene.frame is not None:
+    if scene.frame is not None and not scene.whole:
         direct = 0 if scene.frame.direct is None else np.asarray(scene.frame.direct)
         lights |= {"picture": scene.radiance(judge + direct), "light": judge}
     return {
         name: exposure(np.nan_to_num(light, posinf=0, neginf=0)) for name, light in lights.items()
     }
-
-
-def _judge(scene: Scene) -> np.ndarray:
-    """The version that sets the brightness for all: the reference, else the last."""
-    return scene.images.get(REFERENCE, list(scene.images.values())[-1])
 
 
 def pack(image: np.ndarray, unit: float = 1) -> str:

@@ -1,6 +1,6 @@
 """What a page compares: one frame, or pictures without one, in several versions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +17,9 @@ REFERENCE = "reference"
 class Scene:
     """Versions of one picture, (H, W, 3) float32 each, under the names of the page.
 
-    With a `frame` they are demodulated indirect light, without one radiance. The version called
-    `reference`, if there is one, is what the others are measured against, and comes last.
+    Of a `frame` of ours they are demodulated indirect light, of another program's and without one
+    radiance. The version called `reference`, if there is one, is what the others are measured
+    against, and comes last.
     """
 
     name: str
@@ -26,22 +27,32 @@ class Scene:
     frame: Frame | None = None
 
     def __post_init__(self) -> None:
-        checks.same_size(**self.images, frame=self.frame and self.frame.albedo)
+        checks.same_size(**self.images, frame=self.frame and self.frame.normal)
 
     @property
     def size(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return next(iter(self.images.values())).shape[:2]
 
+    @property
+    def whole(self) -> bool:
+        """Whether the versions are pictures."""
+        return self.frame is None or self.frame.beauty is not None
+
+    @property
+    def judge(self) -> np.ndarray:
+        """The version that sets the brightness for all: the reference, else the last."""
+        return self.images.get(REFERENCE, list(self.images.values())[-1])
+
     def radiance(self, image: np.ndarray) -> np.ndarray:
         """What is measured, (H, W, 3) float64: the light that `image` reflects, or itself."""
-        with np.errstate(invalid="ignore"):  # black times infinite
-            shown = image if self.frame is None else np.asarray(self.frame.albedo) * image
-        return np.asarray(shown, np.float64)
+        if self.frame is None:
+            return np.asarray(image, np.float64)
+        return metrics.reflected(self.frame, image)
 
     def measure(self, name: str) -> dict[str, float | None]:
         """The metrics of version `name` against the reference."""
-        if self.frame is None:
+        if self.frame is None or self.whole:
             return metrics.compare(self.images[name], self.images[REFERENCE])
         return metrics.measure(self.frame, self.images[name])
 
@@ -49,11 +60,11 @@ class Scene:
 def of_frame(name: str, frame: Frame, denoised: dict[str, np.ndarray]) -> Scene:
     """The frame's noisy light, or its picture if it is another program's, what is `denoised` of
     that, and its reference if it has one."""
-    whole = frame.beauty is not None
-    images = {NOISY: np.asarray(frame.beauty if whole else frame.indirect), **denoised}
+    noisy = frame.indirect if frame.beauty is None else frame.beauty
+    images = {NOISY: np.asarray(noisy), **denoised}
     if frame.reference is not None:
         images.setdefault(REFERENCE, np.asarray(frame.reference))
-    return Scene(name, images, None if whole else frame)
+    return Scene(name, images, frame)
 
 
 def collect(
@@ -71,7 +82,7 @@ def collect(
     Raises OSError and ValueError, in one sentence, for what cannot be compared.
     """
     channels = {path: exr.read_channels(path) for path in paths}
-    frames = [path for path in paths if not _is_picture(channels[path])]
+    frames = [path for path in paths if not is_picture(channels[path])]
     pictures = [path for path in paths if path not in frames]
     if not frames and layers:
         raise ValueError(f"--map is for frames, and {paths[0]} is a picture")
@@ -96,9 +107,9 @@ def collect(
     return scenes
 
 
-def _is_picture(channels: dict[str, np.ndarray]) -> bool:
-    """Whether this is one finished image, and no frame with guides."""
-    return "indirect.R" in channels or set(channels) <= set("RGBA")
+def is_picture(names: Collection[str]) -> bool:
+    """Whether channels of these names are one finished image, and no frame with guides."""
+    return "indirect.R" in names or set(names) <= set("RGBA")
 
 
 def _plain(

@@ -1,11 +1,15 @@
 """Motion vectors from depth and two cameras, where the renderer wrote none."""
 
+import dataclasses
+from typing import Any
+
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jflnr import checks
 from jflnr.camera import Camera, centres
-from jflnr.frame import Array
+from jflnr.frame import Array, Frame
 
 # Where nothing is hit, so many scene units away: a turn of the camera moves it, a step does not.
 SKY = 1e6
@@ -27,3 +31,14 @@ def camera_motion(depth: Array, camera: Camera, before: Camera) -> jax.Array:
     points = Camera(now.at[:3, 3].add(-then[:3, 3]), camera.fov_x).points(here, far, width, height)
     there = Camera(then.at[:3, 3].set(0), before.fov_x).project(points, width, height)
     return there - here
+
+
+def with_motion(frame: Frame, header: dict[str, Any], before: dict[str, Any]) -> Frame:
+    """The frame with motion from its camera and the last frame's, if it has none and they do.
+
+    header, before: what `read_header` gives of this file and of the last.
+    """
+    camera, last = Camera.of(header), Camera.of(before)
+    if frame.motion is not None or camera is None or last is None:
+        return frame
+    return dataclasses.replace(frame, motion=np.asarray(camera_motion(frame.depth, camera, last)))

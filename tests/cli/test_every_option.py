@@ -23,6 +23,7 @@ ROWS: dict[str, list[str]] = {
     "--map": ["--map", "ao=emission.G"],
     "--method": ["--method", "flr"],
     "--explain": ["--method", "auto", "--explain"],
+    "--worth": ["--method", "auto", "--worth", "0.3"],
     "--guides": ["--guides", "normal"],
     "--params": ["--params", "fitted.json"],
     "--sigma": ["--sigma", "3"],
@@ -69,6 +70,7 @@ REFUSED: dict[tuple[str, str | None, str | None], str] = {
         for option in ("channels", "explain", "fail-below", "lobes", "png", "profile", "reference")
     },
     ("--error-map", "pieces", "opencl"): WHOLE,
+    ("--worth", "pieces", "opencl"): WHOLE,
 }
 
 

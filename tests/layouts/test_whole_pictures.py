@@ -114,6 +114,11 @@ def test_our_own_frames_are_not(frame: Frame, frame_file: Path) -> None:
         jflnr.denoise(frame, "picture")
 
 
+def test_a_picture_may_be_mapped_in_our_own_frame(frame: Frame, frame_file: Path) -> None:
+    mapped = read_frame(frame_file, layers={"beauty": "direct"})
+    np.testing.assert_array_equal(mapped.beauty, frame.direct)
+
+
 def test_the_filter_follows_the_samples_that_a_file_tells(tmp_path: Path) -> None:
     source, name = FOLDER / "cutout.exr", "cycles.ViewLayer.samples"
     others = exr.read_attributes(source).others

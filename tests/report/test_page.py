@@ -1,6 +1,5 @@
 """The page in a browser: what is on the canvas must be what was measured."""
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,35 +10,18 @@ import pytest
 from jflnr.frame import composite
 from jflnr.metrics import exposure
 from jflnr.report.scenes import Scene
+from tests.report.pages import check_axe, opened, press, settle
 
 WIDE = {"width": 1280, "height": 800}
 
 
 @pytest.fixture
 def page(browser: Any, report: Path) -> Iterator[Any]:
-    """The page, opened from a file without a network; errors of the console fail the test."""
-    context = browser.new_context(viewport=WIDE, offline=True)
-    page, errors = context.new_page(), []
-    page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("request", lambda r: None if r.url.startswith(("file:", "data:")) else errors.append(r))
-    page.goto(report.as_uri())
-    page.wait_for_selector("#images li")
-    settle(page)
-    yield page
-    context.close()
-    assert not errors
-
-
-def settle(page: Any) -> None:
-    """Wait until what was asked for has been drawn."""
-    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def press(page: Any, *keys: str) -> None:
-    for key in keys:
-        page.keyboard.press(key)
-    settle(page)
+    """The page, opened from a file without a network."""
+    with opened(browser, report.as_uri(), viewport=WIDE, offline=True) as page:
+        page.wait_for_selector("#images li")
+        settle(page)
+        yield page
 
 
 def shown(page: Any, x: int, y: int) -> np.ndarray:
@@ -214,11 +196,6 @@ def test_two_fingers_zoom_on_a_phone(browser: Any, report: Path) -> None:
 
 
 def test_no_serious_finding_of_axe(page: Any) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     for prepare in ("", "m", "?"):
         press(page, *filter(None, [prepare]))
-        found = axe.Axe().run(page).response["violations"]
-        serious = [v for v in found if v["impact"] in ("serious", "critical")]
-        assert not serious, json.dumps(
-            [(v["id"], [n["html"] for n in v["nodes"]]) for v in serious], indent=1
-        )
+        check_axe(page)

@@ -60,6 +60,12 @@ def test_plain_pictures_need_a_reference_to_be_measured(tmp_path: Path, frame: F
     assert scene.measure("a")["mse"] == pytest.approx(np.mean((0.5 * y) ** 2), rel=1e-6)
 
 
+def test_a_picture_of_another_program_alone(tmp_path: Path, frame: Frame) -> None:
+    exr.write_channels(tmp_path / "render.exr", passes(frame))
+    (scene,) = collect([tmp_path / "render.exr"], 1, None)
+    assert list(scene.images) == ["noisy"]
+
+
 @pytest.mark.parametrize("by", ["--reference", "--map"])
 def test_pictures_of_other_programs_are_compared_whole(
     by: str, tmp_path: Path, frame: Frame

@@ -16,6 +16,8 @@ import pytest
 
 import jflnr
 from jflnr.cli import main
+from jflnr.methods import method_of
+from tests.report.pages import check_axe, opened
 
 READY = "#versions tbody tr:nth-child({})"
 
@@ -66,16 +68,11 @@ def viewed(folder: Path) -> Iterator[Viewed]:
 
 @pytest.fixture
 def page(browser: Any, viewed: Viewed) -> Iterator[Any]:
-    """The page of a folder without a frame; errors of the console fail the test."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900}, bypass_csp=True)
-    page, errors = context.new_page(), []
-    page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(viewed.url)
-    page.wait_for_selector("#asked")
-    yield page
-    context.close()
-    assert not errors
+    """The page of a folder without a frame."""
+    size = {"width": 1280, "height": 900}
+    with opened(browser, viewed.url, viewport=size, bypass_csp=True) as page:
+        page.wait_for_selector("#asked")
+        yield page
 
 
 @pytest.fixture
@@ -116,11 +113,24 @@ def test_a_method_is_switched_and_a_folder_followed(
     name = "auto, without ao, blocks of 16 pixels"
     row = page.locator("#versions tbody tr").last
     assert name in row.inner_text() and " ms" in row.inner_text()
-    assert "of the frame, in tiles of 64 pixels" in row.inner_text()
+    assert "refined: 100% of the frame, in tiles of 64 pixels" in row.inner_text()
     assert row.locator("canvas").count() == 3
     expected = np.asarray(jflnr.denoise(frame, "auto", guides=("normal", "depth"), block=16))
     np.testing.assert_allclose(light_of(page, name), expected, rtol=2e-3, atol=2e-3)
     page.select_option("#map", "told")
+
+    page.fill("#worth", "1")
+    assert page.inner_text("#worth-text") == "100 % signal"
+    page.click("#asked button")
+    page.wait_for_selector(READY.format(3))
+    coarse = "auto, from 100 % signal, without ao, blocks of 16 pixels"
+    row = page.locator("#versions tbody tr").last.inner_text()
+    assert coarse in row and "refined: 0% of the frame" in row
+    method = method_of("auto", worth=1.0, block=16)
+    expected = np.asarray(jflnr.denoise(frame, method, guides=("normal", "depth")))
+    np.testing.assert_allclose(light_of(page, coarse), expected, rtol=2e-3, atol=2e-3)
+    page.select_option("#method", "flr")
+    assert page.locator("#worth").is_hidden()
 
     render("f_10.exr")
     page.wait_for_function("state.scene.name === 'f_10.exr' && state.left.name !== 'noisy'")
@@ -131,17 +141,25 @@ def test_a_method_is_switched_and_a_folder_followed(
     assert page.evaluate("state.scene.name") == "f_10.exr"
 
 
+def test_a_phone_needs_no_sideways_scrolling(
+    browser: Any, viewed: Viewed, render: Callable[[str], Path]
+) -> None:
+    """With every control shown, and a version denoised."""
+    size = {"width": 390, "height": 844}
+    with opened(browser, viewed.url, viewport=size, bypass_csp=True) as page:
+        render("f.exr")
+        page.wait_for_selector(READY.format(1))
+        page.select_option("#method", "auto")
+        assert page.locator("#worth").is_visible()
+        widths = "[document.documentElement, $('versions')].map(e => e.scrollWidth - e.clientWidth)"
+        assert page.evaluate(widths) == [0, 0]
+
+
 def test_no_serious_finding_of_axe(page: Any, render: Callable[[str], Path]) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    for count in range(2):
-        found = axe.Axe().run(page).response["violations"]
-        serious = [v for v in found if v["impact"] in ("serious", "critical")]
-        assert not serious, json.dumps(
-            [(v["id"], [n["html"] for n in v["nodes"]]) for v in serious], indent=1
-        )
-        if count == 0:
-            render("f.exr")
-            page.wait_for_selector(READY.format(1))
+    check_axe(page)
+    render("f.exr")
+    page.wait_for_selector(READY.format(1))
+    check_axe(page)
 
 
 def test_the_page_obeys_its_own_policy(browser: Any, viewed: Viewed, render: Any) -> None:

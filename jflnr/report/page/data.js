@@ -28,10 +28,18 @@ async function unpack(text, unit) {
   return values;
 }
 
-/** One version of a scene with its numbers, and maps of 0..255. */
+async function loadPicture(text) {
+  const picture = new Image();
+  picture.src = `data:image/png;base64,${text}`;
+  await picture.decode();
+  return picture;
+}
+
+/** One version of a scene with its numbers, and maps of 0..255; of a shot, with its pictures. */
 async function loadImage(stored, unit) {
   const image = { ...stored, maps: {}, canvases: {}, radiance: {} };
-  image.light = await unpack(stored.light, unit);
+  if (stored.frames) image.frames = await Promise.all(stored.frames.map(loadPicture));
+  else image.light = await unpack(stored.light, unit);
   for (const [name, text] of Object.entries(stored.maps)) image.maps[name] = await inflate(text);
   return image;
 }
@@ -43,7 +51,7 @@ async function loadScene(stored) {
   for (const [name, text] of Object.entries(stored.layers))
     scene.layers[name] = await unpack(text, name === "albedo" ? 1 : stored.unit);
   for (const image of stored.images) scene.images.push(await loadImage(image, stored.unit));
-  scene.reference = scene.images.find((image) => image.name === "reference");
+  if (!scene.rate) scene.reference = scene.images.find((image) => image.name === "reference");
   return scene;
 }
 

@@ -64,6 +64,12 @@ const SHORTCUTS = [
     text: "zoom",
   },
   { shown: "f", keys: { f: () => fit() }, text: "fit the image into the window" },
+  { shown: "Space", keys: { " ": () => play() }, text: "play a shot, or hold it" },
+  {
+    shown: ", .",
+    keys: { ",": () => hold(state.frame - 1), ".": () => hold(state.frame + 1) },
+    text: "previous, next frame of a shot",
+  },
   { shown: "c", keys: { c: () => addCrop() }, text: "add a crop under the pointer" },
   { shown: "r", keys: { r: () => reset() }, text: "reset" },
   { shown: "?", keys: { "?": () => $("help").showModal() }, text: "this list" },
@@ -75,6 +81,8 @@ function onKey(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || $("help").open) return;
   if (event.target.matches("select, input") && event.key.length > 1) return;
   if (/^Arrow(Up|Down)$/.test(event.key) && CONTENT.scenes.length < 2) return; // they scroll
+  if (/^[ ,.]$/.test(event.key) && !state.scene.rate) return; // Space scrolls
+  if (event.key === " " && event.target.matches("select, button, summary")) return; // it presses
   const arrow = /^Arrow(Left|Right)$/.exec(event.key);
   const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code);
   if (event.target === $("divider") && arrow)

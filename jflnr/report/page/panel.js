@@ -33,6 +33,8 @@ function listenToControls() {
     });
   $("exposure").addEventListener("input", () => setStops(Number($("exposure").value)));
   $("reset").addEventListener("click", reset);
+  $("play").addEventListener("click", () => play());
+  $("frame").addEventListener("input", () => hold(Number($("frame").value)));
 }
 
 function reset() {
@@ -48,6 +50,7 @@ function buildPanel() {
     ...views.map((view) => element("option", { value: view }, VIEWS[view])),
   );
   $("view").parentElement.hidden = views.length < 2;
+  for (const name of ["tone", "exposure"]) $(name).parentElement.hidden = Boolean(scene.rate);
   if (!views.includes(state.view)) state.view = views[0];
   const there = (map) => scene.images.some((image) => mapShown(scene, image, map) === map);
   const maps = Object.entries(MAPS).filter(([map]) => there(map));
@@ -88,19 +91,22 @@ function showPanel() {
       : state.left.name,
   );
   showImages();
+  showPlayer();
   showBar();
 }
 
 function showImages() {
   const { scene, pointer } = state;
-  $("place").textContent = pointer ? `pixel ${pointer.join(", ")}` : "point at a pixel to read it";
+  const place = pointer ? `pixel ${pointer.join(", ")}` : "point at a pixel to read it";
+  $("place").textContent = scene.rate ? scene.frames[state.frame] : place;
   [...$("images").children].forEach((row, i) => {
     const [left, right, value] = row.children,
       image = scene.images[i];
     left.setAttribute("aria-pressed", image === state.left);
     right.setAttribute("aria-pressed", image === state.right);
     right.hidden = state.layout !== "split";
-    value.textContent = pointer ? pixelText(scene, image, pointer) : "";
+    if (scene.rate) value.textContent = errorText(image);
+    else value.textContent = pointer ? pixelText(scene, image, pointer) : "";
   });
 }
 

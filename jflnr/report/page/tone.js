@@ -85,7 +85,8 @@ function paintMap(pixels, values, share) {
 }
 
 /** The image as a canvas of its own size, painted anew only when a setting changes. */
-function canvasOf(scene, image, { view, map, tone, stops }) {
+function canvasOf(scene, image, { view, map, tone, stops, frame }) {
+  if (image.frames) return image.frames[frame];
   const shown = mapShown(scene, image, map);
   const key = shown === "image" ? [view, tone, stops].join() : shown;
   const old = image.canvases[shown];

@@ -38,11 +38,18 @@ function buildForm() {
     "form",
     { id: "asked", className: "controls" },
     chooser("method", "Method", plain(CONTENT.view.methods)),
+    element(
+      "label",
+      { className: "wide", hidden: true },
+      "Refine from",
+      element("input", { id: "worth", type: "range", min: 0.05, max: 1, step: 0.05 }),
+      element("output", { id: "worth-text", htmlFor: "worth" }),
+    ),
     chooser("guides", "Guides", [["", "all"]]),
     chooser("block", "Blocks", [["", "as usual"], ...blocks]),
     chooser("backend", "Back end", plain(CONTENT.view.backends)),
     element("button", {}, "Denoise"),
-    element("label", {}, element("input", follow), " show and denoise what comes"),
+    element("label", { className: "wide" }, element("input", follow), " show and denoise what comes"),
   );
   form.addEventListener("submit", (event) => {
     event.preventDefault();
@@ -58,6 +65,12 @@ function buildForm() {
     ),
   );
   $("viewer").after(element("section", { ...rows, ariaLabel: "What was denoised", hidden: true }));
+}
+
+/** How little method auto refines, where that is chosen. */
+function showWorth() {
+  $("worth").parentElement.hidden = $("method").value !== "auto";
+  $("worth-text").textContent = `${Math.round(100 * $("worth").value)} % signal`;
 }
 
 /** Guides that the scene has: all, all but one, and each alone. */
@@ -79,9 +92,12 @@ function asked() {
   const options = Object.fromEntries(
     ["method", "guides", "block", "backend"].map((name) => [name, $(name).value]),
   );
+  const worth = Number($("worth").value);
+  if (options.method === "auto" && worth !== CONTENT.view.worth) options.worth = worth;
   const text = (name) => $(name).selectedOptions[0].textContent;
   const name = [
     options.method,
+    options.worth && `from ${$("worth-text").textContent}`,
     options.guides && text("guides"),
     options.block && `blocks of ${text("block")}`,
     options.backend !== CONTENT.view.backends[0] && text("backend"),
@@ -178,7 +194,10 @@ function watch() {
 
 addEventListener("load", () => {
   buildForm();
-  document.addEventListener("scene", () => ($("method").value = state.scene.method), { once: true });
+  $("worth").value = CONTENT.view.worth;
+  $("asked").addEventListener("input", showWorth);
+  const usual = () => [($("method").value = state.scene.method), showWorth()];
+  document.addEventListener("scene", usual, { once: true });
   document.addEventListener("scene", () => [buildGuides(), buildVersions()]);
   watch();
 });

@@ -15,6 +15,8 @@ const state = {
   x: 0,
   y: 0, // screen pixels per image pixel; the point of the image in the middle
   pointer: null, // the pixel [x, y] under the pointer
+  frame: 0,
+  playing: null, // of a shot; an object for each time that it is played
 };
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
