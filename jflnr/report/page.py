@@ -19,16 +19,7 @@ from jflnr.report.crops import find_crops
 from jflnr.report.scenes import REFERENCE, Scene
 from jflnr.report.shot import Shot, shot_data
 
-SCRIPTS = (
-    "data.js",
-    "tone.js",
-    "viewer.js",
-    "panel.js",
-    "player.js",
-    "keys.js",
-    "tables.js",
-    "main.js",
-)
+SCRIPTS = "data tone viewer panel player keys tables main".split()
 LOWER_IS_BETTER = ("flip", "rmse", "smape", "mse", "mse_unbiased", "ms", "warped")
 
 
@@ -68,7 +59,7 @@ def page(title: str, content: Mapping[str, Any], extra: str) -> str:
     parts = {
         "STYLE": read("style.css"),
         "EXTRA": extra,
-        "SCRIPT": "\n".join(map(read, SCRIPTS)),
+        "SCRIPT": "\n".join(read(f"{name}.js") for name in SCRIPTS),
         "TITLE": html.escape(title),
         "DATA": script_data(content),
     }
