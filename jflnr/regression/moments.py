@@ -63,8 +63,9 @@ def centre(guides: Guides, weight: jax.Array | None = None) -> jax.Array:
     far) do not count, or None. Returns `(Q,)`.
     """
     counts = None if weight is None else _sparse(weight) > 0
-    sample = [_sparse(plane) for plane in planes(guides)]
-    return lax.stop_gradient(_sparse_mean(jnp.stack(sample), counts) if sample else jnp.zeros(0))
+    # Each by itself: where they were stacked, the program takes a tenth longer.
+    values = [_sparse_mean(_sparse(plane), counts) for plane in planes(guides)]
+    return lax.stop_gradient(jnp.stack(values) if values else jnp.zeros(0))
 
 
 def unit_of(image: jax.Array) -> jax.Array:
@@ -90,8 +91,8 @@ def _sparse_mean(sample: jax.Array, counts: jax.Array | None) -> jax.Array:
     typical = jnp.abs(sample) < FARTHEST
     if counts is not None:
         typical &= counts
-    total = jnp.sum(jnp.where(typical, sample, 0), axis=(-2, -1))
-    return total / jnp.maximum(jnp.sum(typical, axis=(-2, -1)), 1).astype(sample.dtype)
+    total = jnp.sum(jnp.where(typical, sample, 0))
+    return total / jnp.maximum(jnp.sum(typical), 1).astype(sample.dtype)
 
 
 def from_shift(plane: jax.Array, shift: jax.Array) -> jax.Array:
