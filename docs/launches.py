@@ -1,6 +1,7 @@
 """What the host code launches, as tables for who writes another host (docs/opencl_engine.md):
 
 python docs/launches.py flr-adaptive 640 360
+python docs/launches.py flr-adaptive 640 360 --temporal        a frame with a history
 """
 
 import re
@@ -11,19 +12,28 @@ from typing import Any
 
 import numpy as np
 
+from jflnr.frame import Frame
 from jflnr.methods import method_of
+from jflnr.opencl import temporal
 from jflnr.opencl.context import Context, Launch, is_device_array, source
 from jflnr.opencl.twins import REGRESSIONS
 
 
-def launches(method: str, width: int, height: int) -> list[Launch]:
+def launches(name: str, width: int, height: int, over_time: bool = False) -> list[Launch]:
     """What a frame of this size with normal, depth and occlusion takes, driven as a GPU is."""
-    context, method = Context(work_group=64), method_of(method)
+    context, method = Context(work_group=64), method_of(name)
     context.on_cpu = False
-    image = lambda channels: np.ones((height, width, channels), np.float32)
+    light, normal, depth, ao, motion = (
+        np.ones((height, width, channels), np.float32) for channels in (3, 3, 1, 1, 2)
+    )
+    frame = Frame(indirect=light, normal=normal, depth=depth, ao=ao, motion=motion)
     with context.recorded() as found:
-        run, guides = REGRESSIONS[type(method).__name__], tuple(map(image, (3, 1, 1)))
-        run(image(3), guides, method, context=context)
+        if over_time:
+            state = temporal.start(frame, method, context=context)
+            temporal.step(state, frame, method, context=context)
+        else:
+            run = REGRESSIONS[type(method).__name__]
+            run(light, (normal, depth, ao), method, context=context)
     return found
 
 
@@ -75,4 +85,5 @@ def _listed(defines: dict[str, Any]) -> str:
 
 
 if __name__ == "__main__":
-    print(tables(launches(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))))
+    name, width, height, *options = sys.argv[1:]
+    print(tables(launches(name, int(width), int(height), "--temporal" in options)))
