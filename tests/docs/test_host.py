@@ -93,7 +93,7 @@ def test_the_page_has_what_is_launched(method: str) -> None:
 def test_every_parameter_has_a_name_and_an_argument() -> None:
     """Also those that macros stand for, one in another."""
     try:
-        found = launches("flnr-small", 32, 32)
+        found = launches("flnr-small", 32, 32) + launches("flr", 32, 32, over_time=True)
     except NoDevice as error:
         pytest.skip(str(error))
     for launch in found:
