@@ -145,6 +145,14 @@ def test_other_parameters_do_not_compile_again(scene):
     assert flr_adaptive._cache_size() == before
 
 
+def test_light_far_below_the_brightest_pixel_stays_a_number(scene):
+    """Where that one does not count, what it is divided by leaves squares beyond float32."""
+    x, y = scene
+    light, weight = jnp.full((*y.shape[:2], 1), 1e-20).at[3, 4].set(1e8), jnp.ones(y.shape[:2])
+    found = flr_adaptive(light, x, AdaptiveFLR(), levels=2, weight=weight.at[3, 4].set(0))
+    assert jnp.isfinite(found).all()
+
+
 def test_wrong_arguments_are_named(scene):
     x, y = scene
     with pytest.raises(ValueError, match="levels"):

@@ -99,6 +99,12 @@ def test_what_was_hidden_is_disoccluded() -> None:
     np.testing.assert_array_equal(taps.seen[..., 0], near == 2)
 
 
+@pytest.mark.parametrize(("length", "seen"), [(1, True), (1.5, True), (1e20, False)])
+def test_what_is_no_normal_is_another_surface(length: float, seen: bool) -> None:
+    before = FLAT._replace(normal=np.float32(length) * np.asarray(FLAT.normal))
+    np.testing.assert_array_equal(find_jit(constant(0, 0), FLAT, before).seen, seen)
+
+
 def test_edges_keep_to_their_side() -> None:
     """Half a pixel beside an edge, the tap across it is left out and the others make up for it."""
     depth = np.full((HEIGHT, WIDTH), 2, np.float32)
