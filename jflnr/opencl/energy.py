@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from jflnr.images.guides import shrink
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import Grid, Images, Run, brightness_defines
 from jflnr.opencl.moments import pixel_defines
+from jflnr.opencl.shrink import shrink
 
 
 def frame_mean(run: Run, moments: Any, w: int) -> Any:
@@ -56,7 +56,7 @@ def rescale(
     target, _, weight, _ = images
     (height, width), channels, pooled = target.shape[:2], image.shape[2], image
     if (factor := -(-image.shape[0] // height)) > 1:
-        pooled = context.array(shrink(image.get(), factor))
+        pooled = shrink(image, factor, context=context)
     partial, ratio = context.empty((height, 2)), context.empty((1,))
     defines = pixel_defines(target, (), weight, 1) | brightness_defines(channels)
     defines["WIDTH"] = context.width()
