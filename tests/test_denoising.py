@@ -80,6 +80,14 @@ def test_what_is_outside_the_mask_has_no_influence(frame):
     np.testing.assert_array_equal(clean, spoiled)
 
 
+@pytest.mark.parametrize("factor", [2, 4])
+def test_smaller_light_that_is_constant_stays_so(frame, backend, factor):
+    light = np.full((24 // factor, 40 // factor, 3), 1.5, np.float32)
+    out = jflnr.denoise(changed(frame, indirect=light), backend=backend)
+    assert out.shape == (24, 40, 3)
+    np.testing.assert_allclose(out, 1.5, rtol=1e-5)
+
+
 @pytest.mark.parametrize("method", ["flr", "flr-adaptive", "auto"])
 @pytest.mark.parametrize("factor", [2, 3])
 def test_smaller_light_is_upsampled_to_the_guides(frame, backend, method, factor):

@@ -93,7 +93,10 @@ def a_bad_frame_does_no_harm(method, backend, bad):
 
 
 @pytest.mark.parametrize("method", ["bmfr", "flr"])
-@short(max_examples=60, suppress_health_check=list(HealthCheck))
+@short(
+    max_examples=60,
+    suppress_health_check=[HealthCheck.large_base_example, HealthCheck.function_scoped_fixture],
+)
 @given(BAD)
 def test_a_bad_frame(method, backend, bad):
     a_bad_frame_does_no_harm(method, backend, bad)
