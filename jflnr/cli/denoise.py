@@ -93,6 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="keep there what the next frame needs, for a later run to go on from (--temporal)",
     )
     add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
+    add("--jpeg", action="store_true", help="the same in JPEG")
     add(
         "--channels",
         choices=layouts.CHOICES,
@@ -141,7 +142,7 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
     from jflnr.large import memory
 
     jobs = plan(arguments.inputs, arguments.output)
-    outputs = [path for job in jobs for path in (job.target, job.preview, job.explanation)]
+    outputs = [path for job in jobs for path in job.files]
     sources, others = [job.source for job in jobs], [arguments.history, arguments.log]
     check_apart(others, [*outputs, *sources])
     check_apart([arguments.log], [arguments.history])

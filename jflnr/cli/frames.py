@@ -1,14 +1,11 @@
 """One frame of `jflnr denoise` in three stages: read, denoise, write."""
 
 import argparse
-import contextlib
 import functools
 import json
-import sys
-import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +14,7 @@ import numpy as np
 import jflnr
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence
+from jflnr.cli.compiling import compiling_is_told
 from jflnr.cli.content import (
     Pixels,
     Result,
@@ -32,8 +30,6 @@ from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
 if TYPE_CHECKING:
     from jflnr.frame import Frame
 
-# Seconds that kernels may compile without a word.
-SILENCE = 1.0
 # What became of a frame, as JSON can hold it.
 Record = dict[str, Any]
 # What a denoiser gives, by name: `image`, and what else was asked for.
@@ -109,8 +105,9 @@ class Worker:
 
     def kept(self, job: Job) -> Record | None:
         """The record of a frame of which all is there that was asked for."""
-        wanted = {job.preview: self.arguments.png, job.explanation: self.arguments.explain}
-        outputs = [job.target, *(path for path, asked in wanted.items() if asked)]
+        beside = job.previews | {"explain": job.explanation}
+        asked = vars(self.arguments)
+        outputs = [job.target, *(path for option, path in beside.items() if asked[option])]
         if self.arguments.overwrite or not all(path.exists() for path in outputs):
             return None
         return _record(job) | {"status": "kept", "kept": [str(path) for path in outputs]}
@@ -188,7 +185,7 @@ class Worker:
             warnings.simplefilter("always", UserWarning)
             # The first frame of a kind is denoised twice, to tell compiling from denoising.
             for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
-                with _compiling_is_told(denoiser, arguments.quiet):
+                with compiling_is_told(denoiser, method.name, arguments.quiet):
                     given = denoise_frame(frame)
                 times.append(time.perf_counter())
         if self.compiled is not None:
@@ -254,38 +251,18 @@ class Worker:
             comments = json.dumps(source.header | {"denoiser": about})
             window, others = source.attributes.window, source.attributes.others
             exr.write_channels(job.target, channels, comments, window, others)
-        if arguments.png and missing(job.preview):
-            # The sky or a lamp in view would darken the room, so what is lit sets the brightness.
-            write_preview(job.preview, result.picture, exposure(np.nan_to_num(result.lit)))
+        for option, preview in job.previews.items():
+            if getattr(arguments, option) and missing(preview):
+                # The sky or a lamp in view would darken the room: what is lit sets the brightness.
+                write_preview(preview, result.picture, exposure(np.nan_to_num(result.lit)))
         self.exr_seconds["write"] += time.perf_counter() - start
         return _record(job) | {"status": "written"} | record
-
-
-@contextlib.contextmanager
-def _compiling_is_told(denoiser: "jflnr.Denoiser", quiet: bool) -> Iterator[None]:
-    """Say on stderr what takes so long, if it is kernels that are compiled."""
-    from tqdm import tqdm
-
-    done = threading.Event()
-
-    def tell() -> None:
-        while not done.wait(SILENCE):
-            if denoiser.context.compiles:
-                tqdm.write("jflnr: compiling kernels for this machine, once ...", file=sys.stderr)
-                return
-
-    if denoiser.backend == "opencl" and not quiet:
-        threading.Thread(target=tell, daemon=True).start()
-    try:
-        yield
-    finally:
-        done.set()
 
 
 def failure(job: Job, error: BaseException) -> Record:
     """The record of a frame that failed."""
     text = sentence(error)
-    named = any(printable(path) in text for path in (job.source, job.target, job.preview))
+    named = any(printable(path) in text for path in (job.source, *job.files))
     text = text if named else f"{printable(job.source)}: {text}"
     return _record(job) | {"status": "failed", "error": text}
 

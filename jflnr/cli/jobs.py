@@ -23,12 +23,18 @@ class Job:
     target: Path
 
     @property
-    def preview(self) -> Path:
-        return self.target.with_suffix(".png")
+    def previews(self) -> dict[str, Path]:
+        """By the option that asks for them."""
+        return {"png": self.target.with_suffix(".png"), "jpeg": self.target.with_suffix(".jpg")}
 
     @property
     def explanation(self) -> Path:
         return self.target.with_suffix(".plan.png")
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that may be written."""
+        return self.target, *self.previews.values(), self.explanation
 
 
 def expand(inputs: Sequence[Path]) -> list[Path]:
@@ -63,7 +69,7 @@ def plan(inputs: Sequence[Path], output: Path) -> list[Job]:
         raise ValueError(f"{output}: OUT must be a folder when there are several frames")
     if not as_file and output.suffix.lower() in PICTURES:
         raise ValueError(
-            f"{output}: OUT must end with .exr or .pfm or be a folder (--png adds a preview)"
+            f"{output}: OUT must end with .exr or .pfm or be a folder (--png or --jpeg: a preview)"
         )
     jobs = [Job(file, output if as_file else output / f"{file.stem}.exr") for file in files]
     check_apart((job.target for job in jobs), files)

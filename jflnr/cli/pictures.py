@@ -1,4 +1,4 @@
-"""PNG files beside a denoised frame: a preview to look at, and what `--explain` draws."""
+"""Pictures beside a denoised frame: a preview to look at, and what `--explain` draws."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ REFINED, COARSE = (250, 230, 90), (40, 60, 110)
 
 
 def write_preview(path: Path, picture: np.ndarray, scale: float) -> None:
-    """Write linear radiance (H, W, 3), times `scale`, as 8-bit PNG by the metrics' display rule."""
+    """Write linear radiance (H, W, 3), times `scale`, in 8 bits by the metrics' display rule."""
     _save(path, 255 * display(np.nan_to_num(picture), scale))
 
 
@@ -40,6 +40,6 @@ def plan_of(frame: "Frame", method: Any, guides: Sequence[str] | None) -> tuple[
 
 
 def _save(path: Path, pixels: np.ndarray) -> None:
-    """Write `(H, W, 3)` of 0 to 255, whole or not at all."""
+    """Write `(H, W, 3)` of 0 to 255, as the path's ending says, whole or not at all."""
     with replacing(path) as beside:
-        Image.fromarray(np.round(pixels).astype(np.uint8)).save(beside, format="PNG")
+        Image.fromarray(np.round(pixels).astype(np.uint8)).save(beside, quality=95)

@@ -41,8 +41,9 @@ def as_files(
         raise ValueError("IN is missing: EXR frames, folders of them, or - for standard input")
     if STREAM in inputs and len(inputs) > 1:
         raise ValueError("- stands for one frame, without others")
-    if output == STREAM and (arguments.json or arguments.png or arguments.explain):
-        raise ValueError("-o - writes one picture to standard output, without --json or --png")
+    beside = arguments.png or arguments.jpeg or arguments.explain
+    if output == STREAM and (arguments.json or beside):
+        raise ValueError("-o - writes one picture to standard output, without --json or a preview")
     if output == STREAM and sys.__stdout__ is None:
         raise ValueError("-o - writes to standard output, which is closed")
     with removed(folder := Path(tempfile.mkdtemp())):

@@ -71,7 +71,7 @@ def denoise_in_strips(
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "explain", "reference", "fail_below", "profile", "lobes"):
+    for option in ("png", "jpeg", "explain", "reference", "fail_below", "profile", "lobes"):
         if (value := getattr(arguments, option)) is not None and value is not False:
             raise ValueError(
                 f"--{option.replace('_', '-')} needs the whole frame in memory: raise --memory"

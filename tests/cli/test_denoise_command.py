@@ -167,6 +167,15 @@ def test_preview_shows_the_picture(tmp_path: Path, frame_file: Path) -> None:
 
 
 @pytest.mark.usefixtures("stand_in")
+def test_a_preview_in_jpeg_is_as_bright(tmp_path: Path, frame_file: Path) -> None:
+    assert run(frame_file, "-o", tmp_path / "out.exr", "--png", "--jpeg") == 0
+    png, jpeg = (
+        np.float32(Image.open(tmp_path / f"out{s}").convert("L")) for s in (".png", ".jpg")
+    )
+    assert jpeg.shape == (24, 40) and np.abs(jpeg - png).mean() < 3
+
+
+@pytest.mark.usefixtures("stand_in")
 def test_reference_prints_metrics_before_and_after(
     tmp_path: Path, frame_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,6 +34,7 @@ ROWS: dict[str, list[str]] = {
     "--lobes": ["--lobes"],
     "--history": ["--history", "history.npz"],
     "--png": ["--png"],
+    "--jpeg": ["--jpeg"],
     "--channels": ["--channels", "all"],
     "--reference": ["--reference"],
     "--fail-below": ["--fail-below", "-9"],
@@ -67,7 +68,16 @@ REFUSED: dict[tuple[str, str | None, str | None], str] = {
     },
     **{
         (f"--{option}", "pieces", None): WHOLE
-        for option in ("channels", "explain", "fail-below", "lobes", "png", "profile", "reference")
+        for option in (
+            "channels",
+            "explain",
+            "fail-below",
+            "jpeg",
+            "lobes",
+            "png",
+            "profile",
+            "reference",
+        )
     },
     ("--error-map", "pieces", "opencl"): WHOLE,
     ("--worth", "pieces", "opencl"): WHOLE,

@@ -106,24 +106,32 @@ def test_a_run_keeps_its_programs_for_the_next(frame_file: Path, tmp_path: Path)
     assert kept[0] and kept[1] == kept[0]
 
 
-def test_compiling_is_told_once(frame_file: Path, tmp_path: Path) -> None:
-    """On stderr, unless --quiet is given; a later run finds the kernels."""
-    pytest.importorskip("pyopencl")
-    command = [sys.executable, "-m", "jflnr", "denoise", frame_file, "-o", tmp_path / "out.exr"]
-    command += ["--overwrite", "--method", "flr-adaptive", "--json"]
+def test_compiling_is_told_once(backend: str, frame_file: Path, tmp_path: Path) -> None:
+    """On stderr, unless --quiet is given, and how long it took the last time."""
+    arguments = ["denoise", frame_file, "-o", tmp_path / "out.exr", "--overwrite", "--json"]
 
-    def said(folder: str, *options: str) -> str:
+    def said(folder: str, silence: float, *options: str) -> str:
         (tmp_path / folder).mkdir(exist_ok=True)
-        kept = os.environ | {"POCL_CACHE_DIR": str(tmp_path / folder)}
+        kept = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "home")}
+        for name in ("POCL_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR"):
+            kept[name] = str(tmp_path / folder)
+        program = "from jflnr import __main__ as m; from jflnr.cli import compiling; "
+        program += f"compiling.SILENCE = {silence}; m.main()"
         done = subprocess.run(
-            [*command, *options], env=kept, capture_output=True, text=True, timeout=600
+            [sys.executable, "-c", program, *arguments, "--backend", backend, *options],
+            env=kept,
+            capture_output=True,
+            text=True,
+            timeout=600,
         )
         assert done.returncode == 0 and (options or json.loads(done.stdout))
         return done.stderr
 
-    assert said("kept") == "jflnr: compiling kernels for this machine, once ...\n"
-    assert said("kept") == ""
-    assert said("other", "--quiet") == ""
+    told = "jflnr: compiling flr for this machine, once"
+    assert said("kept", 0.2) == f"{told} ...\n"
+    assert said("kept", 1) == ""
+    assert re.fullmatch(rf"{told} \(\d+ s the last time\) \.\.\.\n", said("other", 0.2))
+    assert said("more", 0.2, "--quiet") == ""
 
 
 def test_a_closed_pipe_is_no_error(frame_file: Path) -> None:
