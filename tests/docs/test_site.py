@@ -1,6 +1,7 @@
 """The site builds without a warning, and its code blocks run as they stand."""
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 from sybil import Document, Example
 from sybil.parsers import markdown
 
+from experiments.pages import FIGURE
 from jflnr import exr
 from jflnr.cli import main
 from jflnr.frame import Frame, write_frame
@@ -38,6 +40,12 @@ def test_every_block_has_a_language(page: Path) -> None:
     fences = [line for line in page.read_text().splitlines() if line.startswith("```")]
     assert all(len(line) > 3 for line in fences[::2]), page
     assert len(fences) % 2 == 0
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_line_begins_with_a_figure(page: Path) -> None:
+    """A comment there ends the paragraph."""
+    assert not re.findall(rf"^\s*{FIGURE.pattern}", page.read_text(), re.MULTILINE)
 
 
 @pytest.fixture
