@@ -45,6 +45,7 @@ INLINE coarse_t coarse_at(global const float *planes, int count, int h, int w, i
 #define OTHER_BLOCK(i) CLAMP((at->x + (i)) / 2 + ((at->x + (i)) % 2 ? 1 : -1), 0, at->w - 1)
 #define MIXED(offset) (0.75f * near[offset] + 0.25f * far[offset])
 #define MIXED_4(offset) (0.75f * READ_4(near + (offset)) + 0.25f * READ_4(far + (offset)))
+#define NEXT(i) COLUMN(MIN(at->x / 2 + (i), at->w - 1), at->count)
 #define OWN(i) MIXED(COLUMN(OWN_BLOCK(i), at->count))
 #define OTHER(i) MIXED(COLUMN(OTHER_BLOCK(i), at->count))
 
@@ -53,13 +54,16 @@ INLINE real doubled(const coarse_t *at, int k)
 {
     global const float *near = at->near + k * GROUP, *far = at->far + k * GROUP;
 #if WIDTH == 8
-    if (at->whole) {
-        const float4 own = MIXED_4(at->own);
-        const float before = MIXED(at->before), after = MIXED(at->after);
-        return 0.75f * own.s00112233 + 0.25f * (real)(before, own.s1, own.s02, own.s13, own.s2, after);
-    }
-#endif
+    const float before = MIXED(at->before), after = MIXED(at->after);
+    float4 own;
+    if (at->whole)
+        own = MIXED_4(at->own);
+    else
+        own = (float4)(MIXED(at->own), MIXED(NEXT(1)), MIXED(NEXT(2)), MIXED(NEXT(3)));
+    return 0.75f * own.s00112233 + 0.25f * (real)(before, own.s1, own.s02, own.s13, own.s2, after);
+#else
     return 0.75f * LANES(real, OWN) + 0.25f * LANES(real, OTHER);
+#endif
 }
 
 // Whether the tile of GROUP x GROUP blocks of the finest grid that block (x, y) lies in is refined, or one

@@ -111,7 +111,7 @@ INLINE void along_column(
         real total[8];
 #pragma unroll
         for (int k = 0; k < together; ++k) total[k] = 0;
-#pragma unroll
+        ROLLED
         for (int t = 0; t < TAPS; ++t) {
             global const float *row = rows + moved[t] + first * GROUP;
 #pragma unroll

@@ -30,6 +30,8 @@ from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
 if TYPE_CHECKING:
     from jflnr.frame import Frame
 
+# Pixels on each side of what shows which programs a frame needs.
+CORNER = 64
 # What became of a frame, as JSON can hold it.
 Record = dict[str, Any]
 # What a denoiser gives, by name: `image`, and what else was asked for.
@@ -186,6 +188,8 @@ class Worker:
             # The first frame of a kind is denoised twice, to tell compiling from denoising.
             for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
                 with compiling_is_told(denoiser, method.name, arguments.quiet):
+                    if denoiser.backend == "opencl" and len(times) == 1:
+                        _compile(denoiser, lambda: denoise_frame(frame.map(_corner)))
                     given = denoise_frame(frame)
                 times.append(time.perf_counter())
         if self.compiled is not None:
@@ -257,6 +261,17 @@ class Worker:
                 write_preview(preview, result.picture, exposure(np.nan_to_num(result.lit)))
         self.exr_seconds["write"] += time.perf_counter() - start
         return _record(job) | {"status": "written"} | record
+
+
+def _compile(denoiser: "jflnr.Denoiser", call: Callable[[], Any]) -> None:
+    from jflnr.opencl.ahead import compile_ahead
+
+    compile_ahead(denoiser.context, call)
+
+
+def _corner(image: Any) -> Any:
+    """Of an image as much as needs the programs of all of it."""
+    return image[:CORNER, :CORNER].copy()
 
 
 def failure(job: Job, error: BaseException) -> Record:

@@ -14,6 +14,9 @@ import numpy as np
 
 from jflnr.opencl import devices, kept
 
+# A file of kernels_cl, and what is defined for it.
+Program = tuple[str, dict[str, Any]]
+
 
 class Launch(NamedTuple):
     """One execution of a kernel: its event, the bytes it must at least read and write, and how it
@@ -54,10 +57,13 @@ class Context:
         self._programs: dict[tuple[Any, ...], Any] = {}
         self._kernels: dict[tuple[Any, ...], Any] = {}
         self._to_keep: dict[Path, Any] = {}  # programs that are not on disk yet
+        self.ahead = False  # whether other processes compile for this one
         self._lock = threading.Lock()  # from setting a kernel's arguments until it is enqueued
-        # What a thread has given to kernels that may not be through, and what it has launched.
+        # What a thread has given to kernels that may not be through, and what it has launched, or
+        # only says that it would launch.
         self._in_use: dict[int, list[np.ndarray]] = {}
         self._launches: dict[int, list[Launch]] = {}
+        self._rehearsed: dict[int, list[Program]] = {}
 
     @property
     def cl(self) -> ModuleType:
@@ -66,8 +72,8 @@ class Context:
 
     @property
     def compiles(self) -> bool:
-        """Whether programs have been compiled that no earlier run had left on disk."""
-        return bool(self._to_keep)
+        """Whether programs are compiled that no earlier run had left on disk."""
+        return self.ahead or bool(self._to_keep)
 
     def width(self, block: int | None = None, across: bool = False) -> int:
         """Neighbours per work-item (WIDTH of kernels_cl/vectors.h), dividing `block` if given.
@@ -98,6 +104,10 @@ class Context:
         all the group's at once, which for large ones does not fit into the cache. group:
         work-items in x of a work-group, for a kernel that is written for one number of them.
         """
+        if (programs := self._rehearsed.get(threading.get_ident())) is not None:
+            if (file, defines) not in programs:
+                programs.append((file, defines))
+            return
         group = group or (1 if alone and self.on_cpu else self.work_group)
         local = (group, *(1 for _ in size[1:]))
         padded = tuple(math.ceil(n / m) * m for n, m in zip(size, local, strict=True))
@@ -119,6 +129,15 @@ class Context:
             yield launches
         finally:
             del self._launches[threading.get_ident()]
+
+    @contextlib.contextmanager
+    def rehearsed(self) -> Iterator[list[Program]]:
+        """The programs that this thread launches meanwhile, none of which run."""
+        programs = self._rehearsed[threading.get_ident()] = []
+        try:
+            yield programs
+        finally:
+            del self._rehearsed[threading.get_ident()]
 
     def scale(self, output: Any, factor: np.float32) -> None:
         """Multiply a device array in place: pyopencl has one kernel for that in all threads."""
@@ -179,21 +198,30 @@ class Context:
             kernel.set_scalar_arg_dtypes([_type(value) for value in arguments])
         return self._kernels[key]
 
+    def place_of(self, file: str, defines: dict[str, int]) -> Path | None:
+        """Where a program is kept, if anywhere."""
+        if not self.on_cpu:
+            return None
+        return kept.place_of(self.device, source(file), _options(defines))
+
+    def compile(self, file: str, defines: dict[str, int]) -> None:
+        """Compile a program, and keep it where `place_of` says."""
+        self._program(file, defines)
+        self._keep_programs()
+
     def _program(self, file: str, defines: dict[str, int]) -> Any:
-        text = source(file)
-        options = [f"-D{define}={value}" for define, value in sorted(defines.items())]
-        place = kept.place_of(self.device, text, options) if self.on_cpu else None
-        if place is None:
-            return self._build(text, options)
-        if (binary := kept.read(place)) is not None:
+        place = self.place_of(file, defines)
+        if place is not None and (binary := kept.read(place)) is not None:
             # One that another driver left is as good as none.
             with contextlib.suppress(self.cl.Error):
                 return self.cl.Program(self.context, [self.device], [binary]).build()
-        self._to_keep[place] = program = self._build(text, options)
+        program = self._build(file, defines)
+        if place is not None:
+            self._to_keep[place] = program
         return program
 
-    def _build(self, text: str, options: list[str]) -> Any:
-        return self.cl.Program(self.context, text).build(options)
+    def _build(self, file: str, defines: dict[str, int]) -> Any:
+        return self.cl.Program(self.context, source(file)).build(_options(defines))
 
     def _keep_programs(self) -> None:
         """Write new programs to disk: once their kernels have run, they hold their code."""
@@ -201,6 +229,10 @@ class Context:
             new, self._to_keep = self._to_keep, {}
         for place, program in new.items():
             kept.write(place, program.get_info(self.cl.program_info.BINARIES)[0])
+
+
+def _options(defines: dict[str, int]) -> list[str]:
+    return [f"-D{define}={value}" for define, value in sorted(defines.items())]
 
 
 def is_device_array(values: Any) -> bool:

@@ -26,6 +26,7 @@ from jflnr.cli.jobs import plan
 from jflnr.frame import Frame, composite, read_frame, read_header, write_frame
 from jflnr.metrics import exposure
 from jflnr.network.weights import FOLDER, shipped
+from jflnr.opencl import ahead
 from jflnr.parameters import save_parameters
 from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.flr import FLR
@@ -42,6 +43,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
         return 0.5 * np.asarray(frame.indirect)
 
     monkeypatch.setattr(denoising.Denoiser, "__call__", denoise)
+    monkeypatch.setattr(ahead, "compile_ahead", lambda *_: None)
     return calls
 
 

@@ -90,7 +90,7 @@ def test_a_run_keeps_its_programs_for_the_next(frame_file: Path, tmp_path: Path)
     )
     own = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
     command = [sys.executable, "-c", code, "denoise", str(frame_file), "--overwrite", "-o"]
-    command[4:4] = ["--backend", "jax"]
+    command[4:4] = ["--backend", "jax", "--quiet"]
     kept = list[set[Path]]()
     for _ in range(2):
         done = subprocess.run(

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jflnr.opencl import Context, NoDevice, all_devices, flr, kept
+from jflnr.opencl import Context, NoDevice, ahead, all_devices, flr, kept
 from jflnr.opencl import context as context_module
+from jflnr.opencl.context import default_context
 from tests.opencl.conftest import PARAMETERS, scene
 
 
@@ -47,6 +48,26 @@ def test_odd_arrays_are_read_right(context: Context) -> None:
     target.flags.writeable = False
     found = flr(shifted, guides, PARAMETERS, context=context)
     np.testing.assert_array_equal(found, flr(target, guides, PARAMETERS, context=context))
+
+
+def test_programs_are_compiled_ahead_by_several_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = default_context()
+    if not context.on_cpu:
+        pytest.skip("only processors' programs are kept")
+    target, guides = scene(20, 30, 2, 1)
+    call = lambda: flr(target, guides, PARAMETERS, context=context)
+    right = call()
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(ahead, "cores", lambda: 2)
+    with context.recorded() as nothing:
+        ahead.compile_ahead(context, call)
+    assert not nothing and not context.compiles
+    with context.recorded() as launches:
+        np.testing.assert_array_equal(call(), right)
+    places = {context.place_of(launch.file, launch.defines) for launch in launches}
+    assert places == set((tmp_path / "opencl").iterdir())
 
 
 def test_programs_are_kept_with_the_code_of_their_kernels(

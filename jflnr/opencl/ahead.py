@@ -1,0 +1,58 @@
+"""Programs compiled before they are needed, on all cores: a processor's driver takes one at a time.
+
+    python -m jflnr.opencl.ahead PROGRAMS < PLACES
+
+compiles those of a JSON list, files and their defines, that are at the places in it which the bytes
+of a pipe tell, and leaves them where later runs find them.
+"""
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from jflnr.cluster import cores
+from jflnr.opencl import kept
+from jflnr.opencl.context import Context, Program, default_context, source
+
+
+def compile_ahead(context: Context, call: Callable[[], Any]) -> None:
+    """Compile what `call` launches and no earlier run has left on disk, in a process per core.
+
+    On a processor, on the default device; elsewhere nothing is done. `call` launches nothing.
+    """
+    if not context.on_cpu or kept.folder() is None:
+        return
+    # It reads what happens to lie in memory; what is wrong with the frame is said in earnest later.
+    with context.rehearsed() as programs, contextlib.suppress(Exception):
+        call()
+    kept_at = [context.place_of(*program) for program in programs]
+    missing = [p for p, file in zip(programs, kept_at, strict=True) if file and not file.exists()]
+    missing.sort(key=lambda program: len(source(program[0])), reverse=True)
+    if (count := min(cores(), len(missing))) < 2:
+        return
+    context.ahead = True
+    command = [sys.executable, "-m", __name__, json.dumps(missing)]
+    # All processes read the same pipe, so each takes the next program when it is done with one.
+    places, told = os.pipe()
+    os.write(told, bytes(range(len(missing))))
+    os.close(told)
+    with contextlib.ExitStack() as stack:
+        stack.callback(os.close, places)
+        stack.callback(setattr, context, "ahead", False)
+        for _ in range(count):
+            process = subprocess.Popen(command, stdin=places, stderr=subprocess.DEVNULL)
+            stack.enter_context(process)  # waits for its end
+
+
+def main(programs: Sequence[Program]) -> None:
+    context = default_context()
+    while place := os.read(0, 1):
+        context.compile(*programs[place[0]])
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))
