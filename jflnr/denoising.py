@@ -75,8 +75,9 @@ def denoise(
     """Denoise the indirect light of a frame, or the whole picture of another program.
 
     frame: as from `read_frame`. Its `indirect` may have any number of channels C: several light
-    groups side by side are denoised together, and their results sum to the denoised sum. For `flr`
-    it may also be smaller than the other layers by a whole factor; the result then has their size.
+    groups side by side are denoised together, and their results sum to the denoised sum. For `flr`,
+    `flr-adaptive` and `auto` it may also be smaller than the other layers by a whole factor; the
+    result then has their size.
     method: an object such as `FLR(sigma=12)`, or a name: `picture`, the whole picture
     (docs/layouts.md), `flr` (section 3.2 of the paper), `flr-adaptive` (docs/adaptive.md), `flnr`,
     the same corrected by a network, `flnr-small`, by a smaller one (docs/flnr.md), `bmfr`, as in

@@ -1,6 +1,7 @@
 """One frame of `jflnr denoise` in three stages: read, denoise, write."""
 
 import argparse
+import contextlib
 import functools
 import json
 import time
@@ -30,7 +31,7 @@ from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
 if TYPE_CHECKING:
     from jflnr.frame import Frame
 
-# Pixels on each side of what shows which programs a frame needs.
+# Pixels on each side of what needs the same programs as a frame.
 CORNER = 64
 # What became of a frame, as JSON can hold it.
 Record = dict[str, Any]
@@ -185,13 +186,12 @@ class Worker:
         times = [time.perf_counter()]
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", UserWarning)
-            # The first frame of a kind is denoised twice, to tell compiling from denoising.
-            for _ in range(1 if self.compiled is None or shapes in self.compiled else 2):
+            if self.compiled is not None and shapes not in self.compiled:
                 with compiling_is_told(denoiser, method.name, arguments.quiet):
-                    if denoiser.backend == "opencl" and len(times) == 1:
-                        _compile(denoiser, lambda: denoise_frame(frame.map(_corner)))
-                    given = denoise_frame(frame)
+                    _make_ready(denoiser, frame, denoise_frame)
                 times.append(time.perf_counter())
+            given = denoise_frame(frame)
+            times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
         about = about_of(frame, denoiser, spp_of(source, arguments))
@@ -263,15 +263,20 @@ class Worker:
         return _record(job) | {"status": "written"} | record
 
 
-def _compile(denoiser: "jflnr.Denoiser", call: Callable[[], Any]) -> None:
+def _make_ready(
+    denoiser: "jflnr.Denoiser", frame: "Frame", denoise_frame: Callable[["Frame"], Given]
+) -> None:
+    """Have all programs for frames like this one, so that compiling is told from denoising."""
+    if denoiser.backend == "jax":  # whose programs are for one size
+        denoise_frame(frame)
+        return
     from jflnr.opencl.ahead import compile_ahead
 
-    compile_ahead(denoiser.context, call)
-
-
-def _corner(image: Any) -> Any:
-    """Of an image as much as needs the programs of all of it."""
-    return image[:CORNER, :CORNER].copy()
+    call = lambda: denoise_frame(frame.map(lambda image: image[:CORNER, :CORNER].copy()))
+    # What is wrong with the frame is said when all of it is denoised.
+    with warnings.catch_warnings(action="ignore"), contextlib.suppress(Exception):
+        compile_ahead(denoiser.context, call)
+        call()
 
 
 def failure(job: Job, error: BaseException) -> Record:
