@@ -16,6 +16,8 @@ DARK = 0.02
 # No light is brighter, in means of the frame: squares of fireflies must not overflow.
 BRIGHTEST = 6e4
 LUMINANCE = (0.2126, 0.7152, 0.0722)
+# Logarithm of the largest factor on the light.
+LARGEST = 1.5
 
 
 class Read(NamedTuple):
@@ -25,9 +27,10 @@ class Read(NamedTuple):
     error: standard error of its brightness. depth: over its median. ao: 1 where there is none.
     """
 
-    # How many values are read of a pixel, the guides of a frame that they come from, the noisy
-    # layer of training frames, and the image that says where there is something.
+    # How many values are read of a pixel, and said of it; the guides of a frame that they come
+    # from, the noisy layer of training frames, and the image that says where there is something.
     PIXEL = 15  # type: ignore[misc]
+    SAID = 3  # type: ignore[misc]
     GUIDES = ("normal", "depth", "ao")  # type: ignore[misc]
     LAYER, COVER = "indirect", "mask"  # type: ignore[misc]
     # What changes with the noise, and the images that are colours, light, and directions.
@@ -61,9 +64,14 @@ class Read(NamedTuple):
         ]
         return jnp.concatenate(planes, axis=-1)
 
-    def corrected(self, gains: jax.Array) -> jax.Array:
+    def corrected(self, said: jax.Array) -> jax.Array:
         """The light by what the network says of it, `(H, W, 3)` both."""
-        return self.light * gains
+        return self.light * factors(said)
+
+
+def factors(said: jax.Array) -> jax.Array:
+    """Those on the light, of what the network says of them."""
+    return jnp.exp(LARGEST * jnp.tanh(said / LARGEST))
 
 
 def luminance(light: jax.Array) -> jax.Array:

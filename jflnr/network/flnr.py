@@ -31,8 +31,6 @@ COLOURS = 3
 # The largest depth that the network sees, over the median; least and largest of all guides.
 DEEPEST = 100
 LIMITS = ((-1, -1, -1, 0, 0), (1, 1, 1, DEEPEST, 1))
-# Logarithm of the largest factor on the light.
-LARGEST = 1.5
 
 
 def to_read(parts: Parts, known: Known) -> tuple[features.Read, jax.Array]:
@@ -147,7 +145,7 @@ def flnr(target: jax.Array, guides: Guides, method: FLNR = DEFAULT, **options: A
 def init(key: jax.Array, widths: Sequence[int], read: Any = features.Read) -> unet.Params:
     """Weights that correct nothing. widths: channels of the network, fine to coarse. read: what it
     reads."""
-    return unet.init(key, read.PIXEL, features.POOLED, widths, COLOURS)
+    return unet.init(key, read.PIXEL, features.POOLED, widths, read.SAID)
 
 
 def evaluate(method: FLNR, parts: Parts, known: Known) -> Parts:
@@ -159,7 +157,7 @@ def evaluate(method: FLNR, parts: Parts, known: Known) -> Parts:
 def correct(method: FLNR, parts: Parts, known: Known) -> Parts:
     """The corrected light, `(H, W, C)`, and the brightness before and after."""
     light, (read, _) = parts["fitted"], to_read(parts, known)
-    gain = jnp.where(read.mask > 0, gains(method.params, read), 1)
+    gain = jnp.where(read.mask > 0, features.factors(said(method.params, read)), 1)
     image = light * jnp.tile(gain, light.shape[2] // COLOURS)
     return {"image": image, "sums": adaptive.before_and_after(image, parts, known["unit"])}
 
@@ -170,11 +168,11 @@ def restore(method: FLNR, parts: Parts, known: Known) -> Parts:
     return given | ({"error": parts["noise"]} if method.with_error else {})
 
 
-def gains(params: unet.Params, read: Any) -> jax.Array:
-    """The factor on the light of every pixel, `(H, W, 3)`. read: as `features.Read`."""
+def said(params: unet.Params, read: Any) -> jax.Array:
+    """What the network says of every pixel, `(H, W, SAID)`. read: as `features.Read`."""
     height, width = read.light.shape[:2]
     scales = unet.scales_of(params)
     margins = [(0, -size % (1 << scales)) for size in (height, width)] + [(0, 0)]
     read = jax.tree.map(lambda image: jnp.pad(image, margins), read)
     out = unet.apply(params, read.pixels(), features.of_means(read, scales))
-    return jnp.exp(LARGEST * jnp.tanh(out[:height, :width] / LARGEST))
+    return out[:height, :width]

@@ -21,7 +21,7 @@ def relative_error(params: unet.Params, example: Example) -> jax.Array:
 
     So every frame and every count of samples says about as much.
     """
-    light = example.read.corrected(flnr.gains(params, example.read))
+    light = example.read.corrected(flnr.said(params, example.read))
     picture = example.albedo * light * example.exposure
     bright = functools.partial(_shown, beyond=lambda curve: BEYOND * jnp.log(curve))
     difference = bright(picture) - bright(example.albedo * example.target)

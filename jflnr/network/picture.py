@@ -14,12 +14,12 @@ from jflnr.frame import Frame
 from jflnr.images.guides import Scene
 from jflnr.lazy import jax, jnp, pytree
 from jflnr.network import unet
-from jflnr.network.features import BRIGHTEST, DARK, doubts, luminance
-from jflnr.network.flnr import COLOURS, DEEPEST, gains
+from jflnr.network.features import BRIGHTEST, DARK, doubts, factors, luminance
+from jflnr.network.flnr import COLOURS, DEEPEST, said
 from jflnr.regression.adaptive import light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH
-from jflnr.regression.features import SAMPLES
+from jflnr.regression.features import SAMPLES, blur
 from jflnr.regression.picture import (
     EVERYTHING,
     GUIDES,
@@ -48,6 +48,7 @@ class Read(NamedTuple):
 
     # As of `features.Read`.
     PIXEL = 27  # type: ignore[misc]
+    SAID = 5  # type: ignore[misc]
     GUIDES = WholePicture.guides  # type: ignore[misc]
     LAYER, COVER = "beauty", "alpha"  # type: ignore[misc]
     OF_NOISE = (  # type: ignore[misc]
@@ -93,14 +94,24 @@ class Read(NamedTuple):
         ]
         return jnp.concatenate(planes, axis=-1)
 
-    def corrected(self, gains: jax.Array) -> jax.Array:
-        """The picture by what the network says of it, `(H, W, 3)` both.
+    def corrected(self, said: jax.Array) -> jax.Array:
+        """The picture `(H, W, 3)` by what the network says of it, `(H, W, 5)`.
 
-        What is dark may brighten where something covers it. The less covers a pixel, the less is
-        changed.
+        Factors on its light: what is dark may brighten where something covers it, and the less
+        covers a pixel, the less they change. And how much it takes of what is left of the noisy
+        picture, at the pixel and as a mean of those around.
         """
-        dark, gains = DARK * self.alpha, 1 + self.alpha**2 * (gains - 1)
-        return jnp.maximum((self.light + dark) * gains - dark, 0)
+        gains = 1 + self.alpha**2 * (factors(said[..., :COLOURS]) - 1)
+        shares, left, dark = jnp.tanh(said[..., COLOURS:]), self.left(), DARK * self.alpha
+        around = jnp.moveaxis(blur(jnp.moveaxis(left, -1, 0)), 0, -1)
+        taken = shares[..., :1] * left + shares[..., 1:] * around
+        return jnp.maximum((self.light + dark) * gains - dark + taken, 0)
+
+    def left(self) -> jax.Array:
+        """What is left of the noisy picture, `(H, W, 3)`; fireflies are no brighter than that."""
+        light, noisy = luminance(self.light), luminance(self.noisy)
+        weight = self.weight * jnp.minimum((4 * light + 0.1) / jnp.maximum(noisy, 1e-6), 1)
+        return jnp.where(self.weight > 0, self.noisy * weight - self.light, 0)
 
 
 def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
@@ -218,4 +229,4 @@ def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
 
 def corrected(params: unet.Params, read: Read) -> Any:
     """The picture `(H, W, 3)` that the network makes of what it reads."""
-    return read.corrected(gains(params, read))
+    return read.corrected(said(params, read))

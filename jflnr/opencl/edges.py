@@ -39,7 +39,7 @@ def filter_layers(
             run("peaks", name, places[name], int(how.mean), follow, one)
             run("most", name, 0, one, two)
             run("most", name, 1, two, one)
-            peak = _blurred(context, _blurred(context, one[None], lanes), lanes)
+            peak = blurred(context, blurred(context, one[None], lanes), lanes)
         numbers = int(how.mean), int(covers), how.factor, float(how.least or 0), to
         run("steer", name, places[name], *numbers, follow, peak if covers else one, usable, steer)
         to += count
@@ -61,12 +61,12 @@ def average(context: Context, steer: Any, follow: Any, usable: Any, alike: Any) 
     height, width = usable.shape
     lanes = context.width()
     size = -(-width // lanes), height
-    near = _blurred(context, image, lanes)
+    near = blurred(context, image, lanes)
     tensor = context.empty((3, height, width))
     defines = {"WIDTH": lanes}
     context.run("structure", "edges.cl", defines, size, (width, height, len(steer), near, tensor))
     for _ in range(3):
-        tensor = _blurred(context, tensor, lanes)
+        tensor = blurred(context, tensor, lanes)
     results = context.empty((height, width)), context.empty(values.shape)
     defines |= {"STEERING": len(steer), "FOLLOWING": len(follow), "REACH": REACH}
     arguments = (width, height, WIDTH**-2, NEAR**-2, near, tensor, values, counts, alike, *results)
@@ -74,9 +74,10 @@ def average(context: Context, steer: Any, follow: Any, usable: Any, alike: Any) 
     return results
 
 
-def _blurred(context: Context, image: Any, lanes: int) -> Any:
+def blurred(context: Context, image: Any, lanes: int) -> Any:
+    """The mean of planes over 3 x 3 pixels with the weights 1, 2, 1, on the device."""
     planes, height, width = image.shape
-    blurred = context.empty(image.shape)
+    result = context.empty(image.shape)
     size = -(-width // lanes), height, planes
-    context.run("blur", "edges.cl", {"WIDTH": lanes}, size, (width, height, planes, image, blurred))
-    return blurred
+    context.run("blur", "edges.cl", {"WIDTH": lanes}, size, (width, height, planes, image, result))
+    return result

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jflnr.network import features, picture, unet
-from jflnr.network.flnr import LARGEST
 from jflnr.opencl.arguments import to_device
 from jflnr.opencl.context import Context
+from jflnr.opencl.edges import blurred
 from jflnr.opencl.grids import GROUP as MARGIN
 from jflnr.opencl.grids import Images
 from jflnr.opencl.moments import guide_arguments, guide_defines, pixel_defines
@@ -83,7 +83,13 @@ def correct_picture(context: Context, params: unet.Params, read: picture.Read) -
     _, said = _said(context, params, size, picture.Read.PIXEL, defines, images)
     result = np.empty(read.light.shape, np.float32)
     output = context.to_fill(result)
-    _write(context, said, (named["alpha"],), named["light"], output, {"PICTURE": 1} | DARK)
+    left, lanes = context.empty((3, *size)), context.width()
+    arguments = size[1], size[0], named["light"], named["noisy"], named["weight"], left
+    only = guide_defines((), 3) | DARK | {"WIDTH": lanes}
+    over = -(-size[1] // lanes), size[0]
+    context.run("left_over", "network/left.cl", only, over, arguments)
+    others = named["alpha"], left, blurred(context, left, lanes)
+    _write(context, said, others, named["light"], output, {"PICTURE": 1} | DARK)
     return context.finish(output, result)
 
 
@@ -113,7 +119,8 @@ def _write(
 ) -> None:
     """Write the light times what the network says. others: as kernels_cl/network/correct.cl."""
     height, width, channels = light.shape
-    defines |= guide_defines((), channels) | {"WIDTH": context.width(), "LARGEST": f"{LARGEST}f"}
+    defines |= guide_defines((), channels) | {"WIDTH": context.width(), "SAID": said.channels // 4}
+    defines["LARGEST"] = f"{features.LARGEST}f"
     size = (said.pitch - MARGIN) // context.width(), said.h
     arguments = width, height, said.h, said.w, said.pitch, said.values, *others, light, output
     context.run("correct", "network/correct.cl", defines, size, arguments)

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The light times the factors that the network gives (jflnr/network/flnr.py, picture.py).
+// The light by what the network says of it (jflnr/network/features.py, picture.py).
 //
-// Defines beside those of the headers, with Q = 0: LARGEST, the logarithm of the largest factor. For
-// light COUNTS, the channels of the map of what was read, and PIXEL of them for each pixel, whose
-// number MASK is 1 where it counts; for whole pictures PICTURE, and DARK, as in features.cl.
+// Defines beside those of the headers, with Q = 0: SAID, how many values it says of a pixel; LARGEST,
+// the logarithm of the largest factor. For light COUNTS, the channels of the map of what was read,
+// and PIXEL of them for each pixel, whose number MASK is 1 where it counts; for whole pictures
+// PICTURE, and DARK, as in features.cl.
 
 #include "vectors.h"
 #include "sizes.h"
 #include "images.h"
+#include "planes.h"
 #include "grids.h"
 #include "network/maps.h"
 
@@ -23,41 +25,48 @@
 #define SECOND_OF(a, b) ((real)(a.s4, b.s4, a.s5, b.s5, a.s6, b.s6, a.s7, b.s7))
 #endif
 
+INLINE real bent(real said)
+{
+    const real size = said < 0 ? -said : said, e = exp_below_0(-2 * size);
+    const real most = (1 - e) / (1 + e);
+    return said < 0 ? -most : most;
+}
+
 INLINE real factor(real said)
 {
-    const real size = said < 0 ? -said : said, e = exp_below_0(-2 / LARGEST * size);
-    const real bent = LARGEST * (1 - e) / (1 + e), exponent = said < 0 ? -bent : bent;
-    return exp_below_0(exponent - LARGEST) * exp(LARGEST);
+    return exp_below_0(LARGEST * (bent(said / LARGEST) - 1)) * exp(LARGEST);
 }
 
 #ifdef PICTURE
-#define OTHERS global const float *alpha
+#define OTHERS global const float *alpha, global const float *left, global const float *around
 #else
 #define OTHERS global const float *read
 #endif
 
-// said: a map of 12 channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as wide.
-// light, output: (H, W, C) in float, alpha: (H, W). Global size ((pitch - MARGIN) / WIDTH, h).
+// said: a map of 4 SAID channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as
+// wide. light, output: (H, W, C) in float, alpha: (H, W), left, around: (3, H, W). Global size ((pitch - MARGIN) / WIDTH, h).
 kernel void correct(
     int width, int height, int h, int w, int pitch, global const float *said, OTHERS,
     global const float *light, global float *output)
 {
     const int x = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x >= w || y >= h || 2 * y >= height) return;
-    said += MAP_AT(x, y, pitch, 12, 0);
+    said += MAP_AT(x, y, pitch, 4 * SAID, 0);
 #ifndef PICTURE
     read += MAP_AT(x, y, pitch, COUNTS, MASK);
 #endif
     for (int dy = 0; dy < 2 && 2 * y + dy < height; ++dy) {
-        real even[3], odd[3];
+        real even[SAID], odd[SAID];
 #ifndef PICTURE
         const real even_counts = READ(read + (long)(2 * dy) * PIXEL * pitch);
         const real odd_counts = READ(read + (long)(2 * dy + 1) * PIXEL * pitch);
 #endif
 #pragma unroll
-        for (int c = 0; c < 3; ++c) {
-            even[c] = factor(READ(said + (long)(6 * dy + c) * pitch));
-            odd[c] = factor(READ(said + (long)(6 * dy + 3 + c) * pitch));
+        for (int c = 0; c < SAID; ++c) {
+            even[c] = READ(said + (long)(2 * dy * SAID + c) * pitch);
+            odd[c] = READ(said + (long)((2 * dy + 1) * SAID + c) * pitch);
+            even[c] = c < 3 ? factor(even[c]) : bent(even[c]);
+            odd[c] = c < 3 ? factor(odd[c]) : bent(odd[c]);
 #ifndef PICTURE
             even[c] = even_counts > 0 ? even[c] : (real)1;
             odd[c] = odd_counts > 0 ? odd[c] : (real)1;
@@ -68,15 +77,23 @@ kernel void correct(
             if (last < 0) continue;
             const long pixel = (long)(2 * y + dy) * width + x0;
             real values[C];
+#ifdef PICTURE
+            const real of_left = part == 0 ? FIRST_OF(even[3], odd[3]) : SECOND_OF(even[3], odd[3]);
+            const real of_around =
+                part == 0 ? FIRST_OF(even[4], odd[4]) : SECOND_OF(even[4], odd[4]);
+            const real cover = guide_lanes(alpha + pixel, 1, 0, 0, last), dark = DARK * cover;
+#endif
 #pragma unroll
             for (int c = 0; c < C; ++c) {
                 const real gain = part == 0 ? FIRST_OF(even[c % 3], odd[c % 3])
                                             : SECOND_OF(even[c % 3], odd[c % 3]);
                 const real before = guide_lanes(light + pixel * C, C, c, 0, last);
 #ifdef PICTURE
-                const real cover = guide_lanes(alpha + pixel, 1, 0, 0, last), dark = DARK * cover;
+                const long row = ((long)c * height + 2 * y + dy) * width;
+                const real taken = of_left * lanes_at(left + row, width, x0) +
+                                   of_around * lanes_at(around + row, width, x0);
                 const real part = 1 + cover * cover * (gain - 1);
-                values[c] = MAX((before + dark) * part - dark, 0);
+                values[c] = MAX((before + dark) * part - dark + taken, 0);
 #else
                 values[c] = gain * before;
 #endif

@@ -37,10 +37,10 @@ def params(rng):
 
 
 def test_network_by_weights_and_light(params, example):
-    def gains(params, light):
-        return flnr.gains(params, example.read._replace(light=light))
+    def said(params, light):
+        return flnr.said(params, example.read._replace(light=light))
 
-    check(gains, params, example.read.light)
+    check(said, params, example.read.light)
 
 
 def test_what_training_minimises(params, example):

@@ -12,7 +12,7 @@ import pytest
 
 from jflnr.network import unet
 from jflnr.network.features import Read
-from jflnr.network.flnr import FLNR, gains, init
+from jflnr.network.flnr import FLNR, init, said
 from jflnr.regression.adaptive import AdaptiveFLR, reach_of
 from jflnr.regression.auto import Auto
 from jflnr.regression.flr import FLR
@@ -100,7 +100,7 @@ def test_the_network_reaches_as_far_as_it_says() -> None:
     rng = np.random.default_rng(0)
     planes = rng.exponential(size=(13, 16, 160)).astype(np.float32)
     read = Read(*(planes[k : k + n].transpose(1, 2, 0) for k, n in PARTS))
-    program, start = jax.jit(gains), -(-unet.reach_of(3) // side) * side + side
+    program, start = jax.jit(said), -(-unet.reach_of(3) // side) * side + side
     other = jax.tree.map(lambda image: image.copy(), read)
     for image in other:
         image[:, start:] *= 3

@@ -4,8 +4,10 @@ import dataclasses
 import functools
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.ndimage
 
 import jflnr
 from jflnr.network import examples, train
@@ -144,6 +146,28 @@ def test_light_passes_sum_to_what_it_makes(corrected):
     np.testing.assert_allclose(total, picture, atol=1e-5 * picture.max())
 
 
+def test_what_the_network_says_is_done_as_in_plain_numpy():
+    random, size = np.random.default_rng(4), (9, 14)
+    light, noisy = random.exponential(size=(2, *size, 3))
+    alpha, weight = random.random((2, *size, 1))
+    weight *= random.random((*size, 1)) > 0.2
+    said = 2 * random.standard_normal((*size, 5))
+    colour = [0.2126, 0.7152, 0.0722]
+    bright = [(image @ colour)[..., None] for image in (light, noisy)]
+    share = weight * np.minimum(1, (4 * bright[0] + 0.1) / bright[1])
+    left = np.where(weight > 0, share * noisy - light, 0)
+    kernel = np.outer([1, 2, 1], [1, 2, 1])[..., None] / 16
+    around = scipy.ndimage.correlate(left, kernel, mode="nearest")
+    gains = 1 + alpha**2 * (np.exp(1.5 * np.tanh(said[..., :3] / 1.5)) - 1)
+    taken = np.tanh(said[..., 3:4]) * left + np.tanh(said[..., 4:]) * around
+    expected = np.maximum((light + 0.02 * alpha) * gains - 0.02 * alpha + taken, 0)
+    with jax.enable_x64(True):
+        nothing = dict.fromkeys(Read._fields, jnp.zeros((*size, 1)))
+        images = {"light": light, "noisy": noisy, "alpha": alpha, "weight": weight}
+        read = Read(**nothing | {name: jnp.asarray(x) for name, x in images.items()})
+        np.testing.assert_allclose(read.corrected(jnp.asarray(said)), expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("on_cpu", [True, False], ids=["cpu", "gpu_like"])
 @pytest.mark.parametrize("size", [(21, 37), (40, 64)])
 def test_its_kernels_are_its_twin(size, on_cpu, monkeypatch):
@@ -159,7 +183,7 @@ def test_its_kernels_are_its_twin(size, on_cpu, monkeypatch):
     images["samples"] = 1 + 30 * images["samples"]
     images["noisy"] = images["noisy"] * 5
     read = Read(**images)
-    right = jax.jit(lambda params, read: read.corrected(train.flnr.gains(params, read)))
+    right = jax.jit(lambda params, read: read.corrected(train.flnr.said(params, read)))
     found = network.correct_picture(context, outspoken(), read)
     np.testing.assert_allclose(found, right(outspoken(), read), rtol=1e-4, atol=1e-5)
 
