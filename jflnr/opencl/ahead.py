@@ -35,16 +35,17 @@ def compile_ahead(context: Context, call: Callable[[], Any]) -> None:
     if (count := min(cores(), len(missing))) < 2:
         return
     context.ahead = True
-    command = [sys.executable, "-m", __name__, json.dumps(missing)]
+    # -P: no module of the user's folder takes the place of ours.
+    command = [sys.executable, "-P", "-m", __name__, json.dumps(missing)]
     # All processes read the same pipe, so each takes the next program when it is done with one.
-    places, told = os.pipe()
+    nowhere, (places, told) = subprocess.DEVNULL, os.pipe()
     os.write(told, bytes(range(len(missing))))
     os.close(told)
     with contextlib.ExitStack() as stack:
         stack.callback(os.close, places)
         stack.callback(setattr, context, "ahead", False)
         for _ in range(count):
-            process = subprocess.Popen(command, stdin=places, stderr=subprocess.DEVNULL)
+            process = subprocess.Popen(command, stdin=places, stdout=nowhere, stderr=nowhere)
             stack.enter_context(process)  # waits for its end
 
 
