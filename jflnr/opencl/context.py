@@ -5,6 +5,7 @@ import functools
 import math
 import threading
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
@@ -121,23 +122,13 @@ class Context:
             told = file, defines, tuple(size), group, tuple(arguments)
             launches.append(Launch(name, event, moved, *told))
 
-    @contextlib.contextmanager
-    def recorded(self) -> Iterator[list[Launch]]:
+    def recorded(self) -> AbstractContextManager[list[Launch]]:
         """What this thread launches meanwhile."""
-        launches = self._launches[threading.get_ident()] = []
-        try:
-            yield launches
-        finally:
-            del self._launches[threading.get_ident()]
+        return _noted(self._launches)
 
-    @contextlib.contextmanager
-    def rehearsed(self) -> Iterator[list[Program]]:
+    def rehearsed(self) -> AbstractContextManager[list[Program]]:
         """The programs that this thread launches meanwhile, none of which run."""
-        programs = self._rehearsed[threading.get_ident()] = []
-        try:
-            yield programs
-        finally:
-            del self._rehearsed[threading.get_ident()]
+        return _noted(self._rehearsed)
 
     def scale(self, output: Any, factor: np.float32) -> None:
         """Multiply a device array in place: pyopencl has one kernel for that in all threads."""
@@ -229,6 +220,16 @@ class Context:
             new, self._to_keep = self._to_keep, {}
         for place, program in new.items():
             kept.write(place, program.get_info(self.cl.program_info.BINARIES)[0])
+
+
+@contextlib.contextmanager
+def _noted(notes: dict[int, list[Any]]) -> Iterator[list[Any]]:
+    """A list for what this thread does meanwhile, in `notes` by thread."""
+    found = notes[threading.get_ident()] = []
+    try:
+        yield found
+    finally:
+        del notes[threading.get_ident()]
 
 
 def _options(defines: dict[str, int]) -> list[str]:
