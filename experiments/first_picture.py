@@ -31,6 +31,26 @@ RUNS = (
     ("picture", "opencl"),
     ("flr-adaptive", "jax"),
 )
+# Prints the seconds that gradients of a method take to compile.
+GRADIENTS = """
+import dataclasses
+import sys
+import time
+import jax
+import jax.numpy as jnp
+import jflnr
+frame = jflnr.read_frame(sys.argv[2]).map(lambda image: image[:128, :160])
+
+def error(light, normal):
+    seen = frame.map(jnp.asarray)
+    seen = dataclasses.replace(seen, indirect=light, normal=normal)
+    return jnp.mean((jflnr.denoise(seen, sys.argv[1]) - frame.reference) ** 2)
+
+traced = jax.jit(jax.grad(error, (0, 1))).trace(frame.indirect, frame.normal)
+start = time.perf_counter()
+traced.lower().compile()
+print(time.perf_counter() - start)
+"""
 # What a command of Open Image Denoise does: from file to file.
 OIDN = """
 import sys
@@ -59,7 +79,15 @@ def run(quick: bool) -> dict[str, Any]:
         if not quick:
             command = ["-c", OIDN, _picture(picture), out]
             rows.append({"method": "OIDN", "backend": "its own"} | _times(command, kept, quick))
-    return {"seconds": rows}
+    methods = ("flr",) if quick else ("flr", "flr-adaptive")
+    return {"seconds": rows, "gradients": [{"method": m, "seconds": gradients(m)} for m in methods]}
+
+
+def gradients(method: str) -> float:
+    """Seconds to compile the gradient by light and normals, of 160 x 128 pixels."""
+    command = [sys.executable, "-c", GRADIENTS, method, str(SHIPPED_FRAME)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=results.ROOT, check=True)
+    return float(done.stdout)
 
 
 def _picture(path: str) -> str:

@@ -17,11 +17,13 @@ from experiments.peers import guided, svgf
 from experiments.results import Parts, Row
 from experiments.shots import SPATIAL, made_up
 from experiments.timing import interleaved
-from jflnr import opencl
 from jflnr.bmfr.fit import fit
 from jflnr.frame import Frame
 from jflnr.images.guides import layers
 from jflnr.network.flnr import FLNR
+from jflnr.opencl import adaptive as adaptive_kernels
+from jflnr.opencl import flnr as flnr_kernels
+from jflnr.opencl import flr as flr_kernels
 from jflnr.opencl.context import default_context
 from jflnr.opencl.profile import profile
 from jflnr.regression.adaptive import AdaptiveFLR
@@ -39,9 +41,9 @@ OIDN: dict[str, dict[str, Any]] = {
 }
 # Methods whose kernels are timed by themselves too, and their constants.
 OPENCL: dict[str, tuple[Callable[..., Any], Any]] = {
-    "flr": (opencl.flr, DEFAULT),
-    "flr-adaptive": (opencl.flr_adaptive, AdaptiveFLR()),
-    "flnr": (opencl.flnr, FLNR()),
+    "flr": (flr_kernels.flr, DEFAULT),
+    "flr-adaptive": (adaptive_kernels.flr_adaptive, AdaptiveFLR()),
+    "flnr": (flnr_kernels.flnr, FLNR()),
 }
 
 

@@ -134,7 +134,7 @@ def by_opencl(case: Case, dtype: Type) -> np.ndarray:
 
 def by_adaptive_opencl(case: Case, dtype: Type) -> np.ndarray:
     """Adaptive FLR's kernels, of one channel."""
-    from jflnr.opencl import flr_adaptive as on_device
+    from jflnr.opencl.adaptive import flr_adaptive as on_device
 
     target = np.ascontiguousarray(case.target)
     return on_device(target, case.guides, AdaptiveFLR(), weight=case.usable)

@@ -37,23 +37,24 @@ def compile_ahead(context: Context, call: Callable[[], Any]) -> None:
     context.ahead = True
     # -P: no module of the user's folder takes the place of ours.
     command = [sys.executable, "-P", "-m", __name__, json.dumps(missing)]
-    # All processes read the same pipe, so each takes the next program when it is done with one.
+    # All read the same pipe, this process too, so each takes the next program when it is done.
     nowhere, (places, told) = subprocess.DEVNULL, os.pipe()
     os.write(told, bytes(range(len(missing))))
     os.close(told)
     with contextlib.ExitStack() as stack:
         stack.callback(os.close, places)
         stack.callback(setattr, context, "ahead", False)
-        for _ in range(count):
+        for _ in range(count - 1):
             process = subprocess.Popen(command, stdin=places, stdout=nowhere, stderr=nowhere)
             stack.enter_context(process)  # waits for its end
+        compile_some(context, missing, places)
 
 
-def main(programs: Sequence[Program]) -> None:
-    context = default_context()
-    while place := os.read(0, 1):
+def compile_some(context: Context, programs: Sequence[Program], places: int) -> None:
+    """Compile those whose places this process reads from the pipe before others do."""
+    while place := os.read(places, 1):
         context.compile(*programs[place[0]])
 
 
 if __name__ == "__main__":
-    main(json.loads(sys.argv[1]))
+    compile_some(default_context(), json.loads(sys.argv[1]), 0)

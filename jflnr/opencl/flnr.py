@@ -17,7 +17,7 @@ from jflnr.opencl.grids import Images
 @one_sentence()
 @in_passes
 def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> Any:
-    """`jflnr.flnr` on an OpenCL device; all else as of `jflnr.opencl.flr_adaptive`."""
+    """`jflnr.flnr` on an OpenCL device; all else as of `flr_adaptive` of `adaptive.py`."""
     return run_on_images(write, target, guides, method, **options)
 
 

@@ -10,7 +10,10 @@ import pytest
 
 from jflnr.images.noisy_guides import smooth_guide as jax_smooth
 from jflnr.network.flnr import FLNR
-from jflnr.opencl import Context, flnr, flr_adaptive, smooth_guide
+from jflnr.opencl import Context
+from jflnr.opencl.adaptive import flr_adaptive
+from jflnr.opencl.flnr import flnr
+from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.regression.adaptive import AdaptiveFLR
 from jflnr.regression.adaptive import flr_adaptive as jax_adaptive
 from tests.opencl import tolerances

@@ -6,7 +6,8 @@ import jax
 import numpy as np
 import pytest
 
-from jflnr.opencl import Context, flr_adaptive
+from jflnr.opencl import Context
+from jflnr.opencl.adaptive import flr_adaptive
 from jflnr.regression.adaptive import flr_adaptive as jax_adaptive
 from jflnr.regression.auto import Auto
 from tests.opencl import tolerances

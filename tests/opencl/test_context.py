@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jflnr.opencl import Context, NoDevice, ahead, all_devices, flr, kept
+from jflnr.opencl import Context, NoDevice, ahead, all_devices, kept
 from jflnr.opencl import context as context_module
 from jflnr.opencl.context import default_context
+from jflnr.opencl.flr import flr
 from tests.opencl.conftest import PARAMETERS, scene
 
 

@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import jflnr
-from jflnr.opencl import Context, flnr, flr, flr_adaptive
+from jflnr.opencl import Context
+from jflnr.opencl.adaptive import flr_adaptive
+from jflnr.opencl.flnr import flnr
+from jflnr.opencl.flr import flr
 from tests.opencl import tolerances
 from tests.opencl.conftest import error, scene
 

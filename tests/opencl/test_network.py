@@ -13,9 +13,10 @@ from jflnr.cli import main
 from jflnr.network import flnr as twin
 from jflnr.network import unet
 from jflnr.network.flnr import FLNR, init
-from jflnr.opencl import Context, flnr, network
+from jflnr.opencl import Context, network
 from jflnr.opencl.adaptive import write_light
 from jflnr.opencl.arguments import to_image, to_layers, to_weight
+from jflnr.opencl.flnr import flnr
 from jflnr.opencl.network import MARGIN, Maps
 from tests.opencl import tolerances
 from tests.opencl.conftest import error, in_float64, scene

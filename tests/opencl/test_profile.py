@@ -12,7 +12,9 @@ import jflnr
 from jflnr.cli import main
 from jflnr.images.guides import DEFAULT, layers
 from jflnr.images.noisy_guides import smooth_guide
-from jflnr.opencl import Context, flr, flr_adaptive, kept
+from jflnr.opencl import Context, kept
+from jflnr.opencl.adaptive import flr_adaptive
+from jflnr.opencl.flr import flr
 from jflnr.opencl.profile import profile
 from jflnr.regression.adaptive import AdaptiveFLR
 from tests.opencl import tolerances

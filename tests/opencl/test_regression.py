@@ -8,7 +8,8 @@ import pytest
 
 import jflnr
 from jflnr.images import guides as guide_layers
-from jflnr.opencl import Context, flr
+from jflnr.opencl import Context
+from jflnr.opencl.flr import flr
 from jflnr.regression.flr import DEFAULT
 from jflnr.regression.flr import flr as jax_flr
 from tests.opencl import tolerances

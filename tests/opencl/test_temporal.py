@@ -12,8 +12,10 @@ from jflnr import temporal
 from jflnr.denoising import SHIPPED_FRAME
 from jflnr.images.inputs import prepare, robust_images
 from jflnr.methods import method_of
-from jflnr.opencl import Context, flnr, flr_adaptive
+from jflnr.opencl import Context
 from jflnr.opencl import temporal as kernels
+from jflnr.opencl.adaptive import flr_adaptive
+from jflnr.opencl.flnr import flnr
 from jflnr.opencl.twins import filters_on
 from jflnr.temporal.change import BLOCK
 from tests.opencl import tolerances

@@ -11,7 +11,7 @@ from experiments.stability import SIZE
 from experiments.stability.cases import CASES, make
 from experiments.stability.measures import measure, passes
 from experiments.stability.methods import EXACT, METHODS, ON_DEVICE
-from jflnr.opencl import flr as on_device
+from jflnr.opencl.flr import flr as on_device
 from jflnr.regression.flr import FLR, flr
 
 MANY = "16 guides, rank 5"
