@@ -13,11 +13,16 @@
 #define G Q
 #endif
 
-// Unrolled, the matrices live in registers; large ones would only take long to compile.
+// Unrolled, the matrices live in registers; large ones would only take long to compile. There the sums
+// of all channels go side by side, since each waits for its last term.
+#define EACH(c) _Pragma("unroll") for (int c = 0; c < C; ++c)
+#define RANGE(k, first, end) UNROLL for (int k = first; k < end; ++k)
 #if G <= 8
 #define UNROLL _Pragma("unroll")
+#define SUMS(c, k, first, end) EACH(c) RANGE(k, first, end)
 #else
 #define UNROLL _Pragma("unroll 1")
+#define SUMS(c, k, first, end) RANGE(k, first, end) EACH(c)
 #endif
 #define LOWER(i, j) ((i) * ((i) + 1) / 2 + (j))
 
@@ -30,8 +35,7 @@ INLINE void least_squares(
 {
     // Row by row: W, scaled to R, then factored in place, R = L L^T; b becomes L^-1 S cov(X, Y).
     real scale[G + 1], l[LOWER(G, 0) + 1], inverse_diagonal[G + 1], b[G * C + 1], value[C];
-    UNROLL
-    for (int c = 0; c < C; ++c) value[c] = xy[c];
+    EACH(c) value[c] = xy[c];
     UNROLL
     for (int i = 0; i < G; ++i) {
         const real mean = xx[XX(i + 1, 0)], mu = mean + shift[i];
@@ -52,27 +56,23 @@ INLINE void least_squares(
             pivot -= entry * entry;
         }
         inverse_diagonal[i] = pivot > 8 * FLT_EPSILON ? rsqrt(pivot) : (real)0;
-        UNROLL
-        for (int c = 0; c < C; ++c) {
-            real entry = (xy[(i + 1) * C + c] - mean * xy[c]) * scale[i];
-            UNROLL
-            for (int k = 0; k < i; ++k) entry -= l[LOWER(i, k)] * b[k * C + c];
-            b[i * C + c] = entry * inverse_diagonal[i];
-        }
+        real row[C];
+        EACH(c) row[c] = (xy[(i + 1) * C + c] - mean * xy[c]) * scale[i];
+        SUMS(c, k, 0, i) row[c] -= l[LOWER(i, k)] * b[k * C + c];
+        EACH(c) b[i * C + c] = row[c] * inverse_diagonal[i];
     }
     UNROLL
     for (int i = G - 1; i >= 0; --i) {
-        UNROLL
-        for (int c = 0; c < C; ++c) {
-            real entry = b[i * C + c];
-            UNROLL
-            for (int k = i + 1; k < G; ++k) entry -= l[LOWER(k, i)] * b[k * C + c];
-            b[i * C + c] = entry * inverse_diagonal[i];
+        real row[C];
+        EACH(c) row[c] = b[i * C + c];
+        SUMS(c, k, i + 1, G) row[c] -= l[LOWER(k, i)] * b[k * C + c];
+        EACH(c)
+        {
+            b[i * C + c] = row[c] * inverse_diagonal[i];
             const real slope = b[i * C + c] * scale[i];
             value[c] -= xx[XX(i + 1, 0)] * slope;
             model[(i + 1) * C + c] = slope;
         }
     }
-    UNROLL
-    for (int c = 0; c < C; ++c) model[c] = value[c];
+    EACH(c) model[c] = value[c];
 }

@@ -99,27 +99,11 @@ kernel void window_rows(
 // A loop of which the compiler is to make no copies: they took it a minute.
 #define ROLLED _Pragma("unroll 1")
 
-// sums: of `count` planes, a constant, over the column. rows: the first of them at the block. moved: how
-// far away each tap's row lies. Up to eight sums at a time stay in registers while the taps go by.
-INLINE void along_column(
-    global const float *rows, const long *moved, const real *weights, int count, real *sums)
+// Adds `count` planes, a constant, of a row times its weight to the sums.
+INLINE void add_row(global const float *row, real weight, int count, real *sums)
 {
-    const int parts = (count + 7) / 8, together = (count + parts - 1) / parts;
-    ROLLED
-    for (int part = 0; part < parts; ++part) {
-        const int first = MIN(part * together, count - together);
-        real total[8];
-#pragma unroll
-        for (int k = 0; k < together; ++k) total[k] = 0;
-        ROLLED
-        for (int t = 0; t < TAPS; ++t) {
-            global const float *row = rows + moved[t] + first * GROUP;
-#pragma unroll
-            for (int k = 0; k < together; ++k) total[k] += weights[t] * READ(row + k * GROUP);
-        }
-#pragma unroll
-        for (int k = 0; k < together; ++k) sums[first + k] = total[k];
-    }
+    _Pragma("unroll 4")
+    for (int k = 0; k < count; ++k) sums[k] += weight * READ(row + k * GROUP);
 }
 
 // The pass along columns, then least squares with a ridge that grows with the noise: the variance of
@@ -136,42 +120,41 @@ kernel void fit(
     if (x >= pitch || y >= h || !refined(tiles, h, pitch, x, y, 0, 0)) return;
     rows += AT(x, y, pitch, ROWS);
     int to_row[TAPS];
-    long moved[TAPS];
-    real weights[TAPS], more[TAPS];
+    real weights[TAPS];
     column_weights(features, refines, x, y, h, pitch, sigma, to_row, weights);
-#pragma unroll
-    for (int t = 0; t < TAPS; ++t) moved[t] = (long)to_row[t] * pitch * ROWS;
 
     real sums_xx[XX(G, G) + 1], sums_xy[(G + 1) * C], shifts[G + 1], variance = 0;
-    along_column(rows, moved, weights, XY(0, 0), sums_xx);
-    along_column(rows + XY(0, 0) * GROUP, moved, weights, (Q + 1) * C, sums_xy);
-#if NOISE
-#pragma unroll
-    for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * weights[t];
-    along_column(rows + K * GROUP, moved, more, 1, &variance);
-#endif
+    for (int k = 0; k <= XX(G, G); ++k) sums_xx[k] = 0;
+    for (int k = 0; k < (G + 1) * C; ++k) sums_xy[k] = 0;
     UNROLL
     for (int q = 0; q < Q; ++q) shifts[q] = shift[q];
-#if POSITIONS
-    along_column(rows + ROW_X(0) * GROUP, moved, weights, Q + 1, sums_xx + XX(Q + 1, 0));
-    along_column(rows + ROW_XX * GROUP, moved, weights, 1, sums_xx + XX(Q + 1, Q + 1));
-    along_column(rows + ROW_X(Q + 1) * GROUP, moved, weights, C, sums_xy + (Q + 1) * C);
-    const float per_sigma = 1 / sigma;
-#pragma unroll
-    for (int t = 0; t < TAPS; ++t) more[t] = weights[t] * ((t - REACH) * per_sigma);
+    // Each row of blocks is read once, from its first plane to its last.
     ROLLED
-    for (int i = 0; i <= Q; ++i) along_column(rows + XX(i, 0) * GROUP, moved, more, 1, sums_xx + XX(Q + 2, i));
-    along_column(rows + ROW_X(0) * GROUP, moved, more, 1, sums_xx + XX(Q + 2, Q + 1));
-    along_column(rows + XY(0, 0) * GROUP, moved, more, C, sums_xy + (Q + 2) * C);
-#pragma unroll
-    for (int t = 0; t < TAPS; ++t) more[t] *= (t - REACH) * per_sigma;
-    along_column(rows, moved, more, 1, sums_xx + XX(Q + 2, Q + 2));
+    for (int t = 0; t < TAPS; ++t) {
+        global const float *row = rows + (long)to_row[t] * pitch * ROWS;
+        const real weight = weights[t];
+        add_row(row, weight, XY(0, 0), sums_xx);
+        add_row(row + XY(0, 0) * GROUP, weight, (Q + 1) * C, sums_xy);
+#if NOISE
+        variance += weight * weight * READ(row + K * GROUP);
+#endif
+#if POSITIONS
+        const real below = weight * ((t - REACH) / sigma);
+        add_row(row + ROW_X(0) * GROUP, weight, Q + 1, sums_xx + XX(Q + 1, 0));
+        add_row(row + ROW_XX * GROUP, weight, 1, sums_xx + XX(Q + 1, Q + 1));
+        add_row(row + ROW_X(Q + 1) * GROUP, weight, C, sums_xy + (Q + 1) * C);
+        for (int i = 0; i <= Q; ++i) sums_xx[XX(Q + 2, i)] += below * READ(row + XX(i, 0) * GROUP);
+        add_row(row + ROW_X(0) * GROUP, below, 1, sums_xx + XX(Q + 2, Q + 1));
+        add_row(row + XY(0, 0) * GROUP, below, C, sums_xy + (Q + 2) * C);
+        add_row(row, below * ((t - REACH) / sigma), 1, sums_xx + XX(Q + 2, Q + 2));
+#endif
+    }
+#if POSITIONS
     // Positions are centred on the window already, so only their own ridge is added.
     sums_xx[XX(Q + 1, Q + 1)] += position_ridge * sums_xx[0];
     sums_xx[XX(Q + 2, Q + 2)] += position_ridge * sums_xx[0];
     shifts[Q] = shifts[Q + 1] = 0;
 #endif
-
     const real count = sums_xx[0], n = MAX(count, 1e-12f) * side;
     const real per_pixel = count > 1e-12f ? 1 / count : (real)0;
     real xx[XX(G, G) + 1], xy[(G + 1) * C];
