@@ -35,7 +35,7 @@ def folders() -> list[Path]:
 
 def run(quick: bool) -> dict[str, Any]:
     """PSNR without the references' noise, SSIM and FLIP of every picture, by each method."""
-    rows = []
+    rows, films = [], []
     for folder in folders()[: 1 if quick else None]:
         halves = references(folder / "reference.exr")
         for spp in (4,) if quick else SAMPLES:
@@ -50,8 +50,26 @@ def run(quick: bool) -> dict[str, Any]:
             )
             print(said.format(**row))
             rows.append(row)
+            if frame.alpha is not None:
+                films.append({"spp": spp, "picture": folder.name} | films_of(frame, folder))
     rows.sort(key=lambda row: row["spp"])
-    return {"pictures": [*rows, *means(rows)], "times": times(quick)}
+    return {"pictures": [*rows, *means(rows)], "films": films, "times": times(quick)}
+
+
+def films_of(frame: Frame, folder: Path) -> dict[str, float]:
+    """PSNR of alpha without the noise of the references': noisy, ours, and OIDN's second pass."""
+    halves = [half[..., 0] for half in references(folder / "reference.exr", "A")]
+    alpha = np.asarray(frame.alpha)
+    color, others = np.repeat(alpha, 3, axis=-1), auxiliaries(frame)
+    films = {
+        "noisy": alpha[..., 0],
+        "ours": jflnr.denoise(frame, "picture")[..., 3],
+        "raw": oidn.layers(color=color, **others)[..., 0],
+        "clean": oidn.prefiltered(color, **others)[..., 0],
+        "alone": oidn.layers(color=color)[..., 0],
+    }
+    psnr = lambda film: -10 * np.log10(unbiased_mse(np.asarray(film, np.float64), *halves))
+    return {name: float(psnr(film)) for name, film in films.items()}
 
 
 def times(quick: bool) -> list[dict[str, Any]]:
@@ -91,11 +109,11 @@ def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
-def references(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Two independent halves."""
+def references(path: Path, names: str = "RGB") -> tuple[np.ndarray, np.ndarray]:
+    """Two independent halves, of these channels."""
     channels = read_channels(path)
     whole, first = (
-        np.stack([np.float64(channels[f"{name}.{c}"]) for c in "RGB"], axis=-1)
+        np.stack([np.float64(channels[f"{name}.{c}"]) for c in names], axis=-1)
         for name in ("reference", "reference_a")
     )
     return first, 2 * whole - first

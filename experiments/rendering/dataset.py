@@ -92,9 +92,15 @@ def evaluation_jobs(split: str) -> Iterator[Job]:
 
 
 def picture_jobs(split: str) -> Iterator[Job]:
-    """Whole pictures: the views of the training frames, or a few of each scene of val and test."""
+    """Whole pictures: the views of the training frames, or a few of each scene of val and test.
+
+    After every fourth training picture there is one of a scene in the air.
+    """
     if split == "train":
-        yield from (replace(job, whole=True) for job in training_jobs())
+        for number, job in enumerate(training_jobs()):
+            yield replace(job, whole=True)
+            if number % 4 == 3:
+                yield Job(f"airy-{FIRST + number // 4}", 0, 320, 184, whole=True)
         return
     for view, scene in itertools.product(range(VIEWS), VAL if split == "val" else TEST):
         yield Job(scene, RANDOM + view, 320, 184, split, whole=True)

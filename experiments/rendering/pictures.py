@@ -40,7 +40,8 @@ def render(
     made = dressed(source, camera, guides, rng)
     tracer = Tracer.of(made.scene, camera, width, height)
     lens = _lens(rng, camera, width, height, guides["depth"])
-    film = _film(rng, made, camera, width, height, lens, stream_seed(seed, "pilot"))
+    transparent = 0.3 if source.world is None else source.world.transparent
+    film = _film(rng, made, camera, width, height, lens, transparent, stream_seed(seed, "pilot"))
     layers: Layers = {name: tracer.guides[name] for name in ("depth", "position")}
     for name, spp in streams().items():
         images = film.sample(spp, stream_seed(seed, name))
@@ -100,15 +101,23 @@ def _film(
     width: int,
     height: int,
     lens: Lens,
+    share: float,
     seed: int,
 ) -> Film:
-    """A film that is exposed about as a person would, a part of those under a sky transparent."""
+    """A film that is exposed about as a person would, a share of those under a sky transparent."""
     shading = Shading.of(made.scene, made.finishes)
-    transparent = bool(rng.random() < 0.3)
+    transparent = bool(rng.random() < share)
     pilot = Film(made.scene, camera, width, height, shading, lens, transparent, PILOT)
-    light = pilot.sample(4, seed)["beauty"].mean(-1)
-    blocks = light[: height // 8 * 8, : width // 8 * 8]
-    blocks = blocks.reshape(height // 8, 8, width // 8, 8).mean((1, 3))
+    seen = pilot.sample(4, seed)
+    light, cover = (_blocks(seen[name].mean(-1)) for name in ("beauty", "alpha"))
+    covered = cover > 0.5 * cover.max()
+    blocks = light[covered] / cover[covered]
     typical = float(np.minimum(blocks, 8 * np.median(blocks) + 1e-9).mean()) / PILOT
     exposure = BRIGHTNESS / typical * 10 ** rng.uniform(-0.3, 0.3)
     return Film(made.scene, camera, width, height, shading, lens, transparent, exposure)
+
+
+def _blocks(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means over 8 x 8 pixels."""
+    height, width = (length // 8 for length in image.shape)
+    return image[: height * 8, : width * 8].reshape(height, 8, width, 8).mean((1, 3))

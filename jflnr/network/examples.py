@@ -21,8 +21,8 @@ from jflnr.network.flnr import DEFAULT, GUIDES, NEEDED
 from jflnr.stages import run
 
 CROP = 128
-# How often crops of fewer than so many samples per pixel are drawn.
-SHARES = {4: 0.5, 16: 0.25, 1 << 30: 0.25}
+# Crops of fewer samples per pixel than the first, than the second, and of more are drawn as often.
+GROUPS = 4, 16
 # Share of the fits that have occlusion among their guides: files of other programs have none.
 OCCLUDED = 0.8
 # Squared error as displayed below which a picture is as good as its target.
@@ -171,7 +171,7 @@ def _record(noisy: Noisy, target: np.ndarray, random: np.random.Generator) -> np
         errors.append(np.mean((display(albedo * found.light, unit * scale) - wanted) ** 2))
     still = {name: getattr(found, name) for name in read._fields if name not in read.OF_NOISE}
     still |= {"by": albedo, "target": np.clip(target * scale, 0, BRIGHTEST)}
-    groups = np.searchsorted(list(SHARES), fields["spp"], side="right")
+    groups = np.searchsorted(GROUPS, fields["spp"], side="right")
     own = [np.mean([e for e, g in zip(errors, groups, strict=True) if g == k]) for k in groups]
     images: dict[str, np.ndarray]
     images = {name: np.asarray(value, np.float16) for name, value in still.items()}
@@ -212,8 +212,7 @@ def draw(method: Any, record: np.ndarray, random: np.random.Generator) -> Exampl
     """
     read, of_noise = method.read, method.read.OF_NOISE
     groups = record["group"][0]
-    shares = np.array(list(SHARES.values()))[groups]
-    shares /= np.bincount(groups)[groups]
+    shares = 1 / np.bincount(groups)[groups]
     chosen = random.choice(len(groups), p=shares / shares.sum())
     height, width = record["target"].shape[1:3]
 

@@ -14,18 +14,22 @@ from jflnr.network.examples import LEAST_ERROR, Example
 # brighter than white is to keep its light, or other exposures would be wrong.
 SMAPE, BEYOND = 5.0, 0.25
 DARKEST = 1e-3
+# Weight of the squared relative error of a crop's light, since medians are darker than means.
+ENERGY = 5.0
 
 
 def relative_error(params: unet.Params, example: Example) -> jax.Array:
     """Squared error of the displayed picture, over that before the network on the whole frame.
 
-    So every frame and every count of samples says about as much.
+    So every frame and every count of samples says about as much. And the crop is to be as bright as
+    its target on the mean.
     """
-    light = example.read.corrected(flnr.said(params, example.read))
-    picture = example.albedo * light * example.exposure
+    picture = example.albedo * example.read.corrected(flnr.said(params, example.read))
+    picture, target = picture * example.exposure, example.albedo * example.target
     bright = functools.partial(_shown, beyond=lambda curve: BEYOND * jnp.log(curve))
-    difference = bright(picture) - bright(example.albedo * example.target)
-    return jnp.mean(difference**2) / example.error
+    difference = bright(picture) - bright(target)
+    brighter = jnp.mean(picture - target) / (jnp.mean(target) + DARKEST)
+    return jnp.mean(difference**2) / example.error + ENERGY * jnp.minimum(brighter**2, 1)
 
 
 def shown_error(picture: jax.Array, target: jax.Array) -> jax.Array:

@@ -19,7 +19,7 @@ from jflnr.network.flnr import COLOURS, DEEPEST, said
 from jflnr.regression.adaptive import light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH
-from jflnr.regression.features import SAMPLES, blur
+from jflnr.regression.features import blur
 from jflnr.regression.picture import (
     EVERYTHING,
     GUIDES,
@@ -29,11 +29,14 @@ from jflnr.regression.picture import (
     finished,
     own_light,
     picture_in,
+    sample_count,
 )
 from jflnr.stages import Known, Parts, Stage
 
 # The network has seen no means of more.
 MOST_SAMPLES = 32
+# Pixels between which light is lent, and the luminance that is too little to be.
+NEAR, LEAST_LIGHT = 3, 1e-3
 
 
 class Read(NamedTuple):
@@ -48,7 +51,7 @@ class Read(NamedTuple):
 
     # As of `features.Read`.
     PIXEL = 27  # type: ignore[misc]
-    SAID = 5  # type: ignore[misc]
+    SAID = 6  # type: ignore[misc]
     GUIDES = WholePicture.guides  # type: ignore[misc]
     LAYER, COVER = "beauty", "alpha"  # type: ignore[misc]
     OF_NOISE = (  # type: ignore[misc]
@@ -95,17 +98,26 @@ class Read(NamedTuple):
         return jnp.concatenate(planes, axis=-1)
 
     def corrected(self, said: jax.Array) -> jax.Array:
-        """The picture `(H, W, 3)` by what the network says of it, `(H, W, 5)`.
+        """The picture `(H, W, 3)` by what the network says of it, `(H, W, 6)`.
 
-        Factors on its light: what is dark may brighten where something covers it, and the less
-        covers a pixel, the less they change. And how much it takes of what is left of the noisy
-        picture, at the pixel and as a mean of those around.
+        Factors on its light: what is dark may brighten where something covers it. How much it takes
+        of what is left of the noisy picture, at the pixel and as a mean of those around; and of
+        what shines near it, which wires thinner than a pixel need where no sample met them.
         """
-        gains = 1 + self.alpha**2 * (factors(said[..., :COLOURS]) - 1)
-        shares, left, dark = jnp.tanh(said[..., COLOURS:]), self.left(), DARK * self.alpha
-        around = jnp.moveaxis(blur(jnp.moveaxis(left, -1, 0)), 0, -1)
-        taken = shares[..., :1] * left + shares[..., 1:] * around
+        dark, left = DARK * self.alpha, self.left()
+        offered = left, _blurred(left), self.shining()
+        shares = jnp.split(jnp.tanh(said[..., COLOURS:]), len(offered), axis=-1)
+        taken = sum(share * image for share, image in zip(shares, offered, strict=True))
+        gains = factors(said[..., :COLOURS])
         return jnp.maximum((self.light + dark) * gains - dark + taken, 0)
+
+    def shining(self) -> jax.Array:
+        """The light within `NEAR` pixels, the brighter the more it counts, `(H, W, 3)`."""
+        bright = luminance(self.light)
+        sums = jnp.concatenate([self.light * bright, bright], axis=-1)
+        for _ in range(NEAR):
+            sums = _blurred(sums)
+        return sums[..., :COLOURS] / (sums[..., COLOURS:] + LEAST_LIGHT)
 
     def left(self) -> jax.Array:
         """What is left of the noisy picture, `(H, W, 3)`; fireflies are no brighter than that."""
@@ -146,8 +158,6 @@ def surfaces_of(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
     albedo, normal = number(clean["albedo"]), number(clean["normal"])
     left = number(picture.normal) - normal
     none, one = xp.zeros_like(normal), xp.ones_like(normal[..., :1])
-    guess = xp.where(scene.averaged, SAMPLES, 1) * one
-    samples = guess if frame.samples is None else frame.samples
     surfaces = {
         "albedo": albedo,
         "albedo_left": xp.clip(number(picture.albedo), 0, 1) - albedo,
@@ -155,7 +165,7 @@ def surfaces_of(frame: Frame, scene: Scene, guides: tuple[Any, ...]) -> Parts:
         "normal_left": xp.sqrt(xp.einsum("...c,...c", left, left))[..., None],
         "seen_normal": number(clean.get("seen_normal", none)),
         "depth": xp.clip(number(clean.get("depth", one)), 0, DEEPEST),
-        "samples": xp.where(samples > 0, samples, guess),
+        "samples": sample_count(frame.samples, scene.averaged) * one,
     }
     return {"surfaces": surfaces, "noisy_own": own_light(picture)}
 
@@ -174,6 +184,8 @@ class PictureFLNR(WholePicture):
     to_read: ClassVar[Any] = staticmethod(to_read)
     others: ClassVar[Any] = staticmethod(surfaces_of)
 
+    # The network has learned from pictures that were refined everywhere.
+    worth: jax.Array | float | None = None
     params: Any = None
 
     @property
@@ -230,3 +242,8 @@ def correct(method: PictureFLNR, parts: Parts, known: Known) -> Parts:
 def corrected(params: unet.Params, read: Read) -> Any:
     """The picture `(H, W, 3)` that the network makes of what it reads."""
     return read.corrected(said(params, read))
+
+
+def _blurred(image: jax.Array) -> jax.Array:
+    """`features.blur` of an image `(H, W, C)`."""
+    return jnp.moveaxis(blur(jnp.moveaxis(image, -1, 0)), 0, -1)

@@ -83,13 +83,18 @@ def correct_picture(context: Context, params: unet.Params, read: picture.Read) -
     _, said = _said(context, params, size, picture.Read.PIXEL, defines, images)
     result = np.empty(read.light.shape, np.float32)
     output = context.to_fill(result)
-    left, lanes = context.empty((3, *size)), context.width()
-    arguments = size[1], size[0], named["light"], named["noisy"], named["weight"], left
+    lanes = context.width()
+    left, shining = (context.empty((planes, *size)) for planes in (3, 4))
+    arguments = size[1], size[0], named["light"], named["noisy"], named["weight"], left, shining
     only = guide_defines((), 3) | DARK | {"WIDTH": lanes}
     over = -(-size[1] // lanes), size[0]
     context.run("left_over", "network/left.cl", only, over, arguments)
-    others = named["alpha"], left, blurred(context, left, lanes)
-    _write(context, said, others, named["light"], output, {"PICTURE": 1} | DARK)
+    around = blurred(context, left, lanes)
+    for _ in range(picture.NEAR):
+        shining = blurred(context, shining, lanes)
+    others = named["alpha"], left, around, shining
+    written = {"PICTURE": 1, "LEAST_LIGHT": f"{picture.LEAST_LIGHT}f"} | DARK
+    _write(context, said, others, named["light"], output, written)
     return context.finish(output, result)
 
 

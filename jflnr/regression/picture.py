@@ -42,6 +42,9 @@ LEAST_ALBEDO = 0.02
 LEAST_ALPHA = 0.02
 # A pixel so many times brighter than those around weighs as little as if it were no brighter.
 FIREFLY, AROUND = 20, 3
+# The noise of what covers a pixel falls with the number of samples to such a power. Pixels on each
+# side that tell it from what is there.
+STRATIFIED, NEARBY = 1.25, 2
 # Guides of the lobes, which are fitted coarsely: normal, albedo and normal of what is seen.
 LOBE_GUIDES = 3
 # On a device numpy does what JAX does elsewhere: pixels that are not finite are no mistake.
@@ -93,9 +96,7 @@ def cleaned(
     xp: Any = picture.beauty.__array_namespace__()
     layers = {name: layer for name, layer in picture._asdict().items() if layer is not None}
     layers.pop("beauty")
-    number: Any = SAMPLES
-    if samples is not None:
-        number = xp.where(samples > 0, samples, xp.where(averaged, SAMPLES, 1))
+    number = sample_count(samples, averaged)
     found = (filtered or filter_layers)(layers, xp.maximum(unit, 1e-12), number)
     clean = dict(zip(layers, found, strict=True))
     if samples is None:
@@ -103,11 +104,34 @@ def cleaned(
     return picture._replace(**clean)
 
 
-def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Parts:
+def sample_count(samples: Array | float | None, averaged: Array) -> Array:
+    """Samples per pixel, a guess where nobody says how many. The rest is as of `cleaned`."""
+    xp: Any = averaged.__array_namespace__()
+    guess = xp.where(averaged, SAMPLES, 1)
+    return guess if samples is None else xp.where(samples > 0, samples, guess)
+
+
+def own_cover(noisy: Array, filtered: Array, samples: Array) -> Array:
+    """Alpha, with what its noise does not explain of what the filter took (the Wiener filter).
+
+    All `(H, W, 1)`. samples: per pixel; they lie apart, so that the noise falls a little faster
+    than one over their number.
+    """
+    xp: Any = noisy.__array_namespace__()
+    taken = xp.where(xp.isfinite(noisy), noisy, filtered) - filtered
+    noise = filtered * (1 - filtered) / samples**STRATIFIED
+    square, noise = (
+        combine(image[..., 0], NEARBY, xp.add)[..., None] for image in (taken**2, noise)
+    )
+    share = xp.maximum(square - noise, 0) / xp.where(square > 0, square, 1)
+    return xp.clip(filtered + share * taken, 0, 1)
+
+
+def images_of(picture: Picture, clean: Picture, samples: Array, unit: Array, lit: Array) -> Parts:
     """What `flr_adaptive` takes: light, guides and weight; and what makes it a picture again.
 
-    unit: brightness of the picture, `()`. lit: whether its albedo shows what shines, as
-    `holds_light` says.
+    samples: per pixel. unit: brightness of the picture, `()`. lit: whether its albedo shows what
+    shines, as `holds_light` says.
     """
     xp: Any = picture.beauty.__array_namespace__()
     covered = xp.ones((1,) * 3, xp.float32) if clean.alpha is None else xp.clip(clean.alpha, 0, 1)
@@ -120,7 +144,9 @@ def images_of(picture: Picture, clean: Picture, unit: Array, lit: Array) -> Part
     guides = tuple(layer for layer in layers if layer is not None)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
     images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
-    images |= {"beauty": picture.beauty}
+    images |= {"beauty": picture.beauty, "film": None}
+    if picture.alpha is not None and clean.alpha is not None:
+        images["film"] = own_cover(picture.alpha, clean.alpha, samples)
     # By rows, as parts of a frame are.
     images |= {"brightness": xp.broadcast_to(unit, (len(light), 1, 1))}
     if picture.colours is None:
@@ -164,6 +190,7 @@ class WholePicture(AdaptiveFLR):
     others: ClassVar[Callable[..., Parts]] = staticmethod(lambda frame, scene, guides: {})
 
     slack: jax.Array | float = 0.005
+    worth: jax.Array | float | None = 0.5
     block: int = field(default=BLOCK, metadata={"static": True})
     lobes: bool = field(default=False, metadata={"static": True})
 
@@ -224,9 +251,9 @@ def denoise_picture(
     unit, averaged = mean_light(picture.beauty), antialiased(picture.normal)
     clean = cleaned(picture, unit, samples, averaged)
     lit = holds_light(picture.albedo, light_in(picture, picture.emission, picture.environment))
-    images = images_of(picture, clean, unit, lit)
+    images = images_of(picture, clean, sample_count(samples, averaged), unit, lit)
     given = regress(dataclasses.replace(method, **options), images)
-    return clean._replace(beauty=given["image"][..., :3])
+    return clean._replace(beauty=given["image"][..., :3], alpha=images["film"])
 
 
 @QUIETLY
@@ -246,7 +273,7 @@ def finished(method: WholePicture, image: Array, parts: Parts) -> Parts:
     image: `(H, W, 3)`; the beauty passes through where a layer that makes it is no number. parts:
     with `error`, of the picture, if the method tells it.
     """
-    alpha = parts["alpha"]
+    alpha = parts["film"]
     xp: Any = image.__array_namespace__()
     known = xp.all(xp.isfinite(image), axis=-1, keepdims=True)
     image = xp.where(known, image, parts["beauty"])
@@ -276,7 +303,8 @@ def _images(
 ) -> Parts:
     picture = picture_in(frame, scene)
     clean = cleaned(picture, scene.light, frame.samples, scene.averaged, filtered)
-    images = images_of(picture, clean, scene.light, scene.lit)
+    samples = sample_count(frame.samples, scene.averaged)
+    images = images_of(picture, clean, samples, scene.light, scene.lit)
     return images | {"lobes": frame.lobes} | others(frame, scene, images["guides"])
 
 

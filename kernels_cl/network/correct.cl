@@ -4,7 +4,7 @@
 // Defines beside those of the headers, with Q = 0: SAID, how many values it says of a pixel; LARGEST,
 // the logarithm of the largest factor. For light COUNTS, the channels of the map of what was read,
 // and PIXEL of them for each pixel, whose number MASK is 1 where it counts; for whole pictures
-// PICTURE, and DARK, as in features.cl.
+// PICTURE, DARK, as in features.cl, and LEAST_LIGHT, the luminance that is too little to be lent.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -38,13 +38,16 @@ INLINE real factor(real said)
 }
 
 #ifdef PICTURE
-#define OTHERS global const float *alpha, global const float *left, global const float *around
+#define OTHERS                                                                                      \
+    global const float *alpha, global const float *left, global const float *around,               \
+        global const float *shining
 #else
 #define OTHERS global const float *read
 #endif
 
 // said: a map of 4 SAID channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as
-// wide. light, output: (H, W, C) in float, alpha: (H, W), left, around: (3, H, W). Global size ((pitch - MARGIN) / WIDTH, h).
+// wide. light, output: (H, W, C) in float, alpha: (H, W), left, around: (3, H, W), shining: (4, H, W),
+// as left.cl wrote it, blurred. Global size ((pitch - MARGIN) / WIDTH, h).
 kernel void correct(
     int width, int height, int h, int w, int pitch, global const float *said, OTHERS,
     global const float *light, global float *output)
@@ -81,7 +84,11 @@ kernel void correct(
             const real of_left = part == 0 ? FIRST_OF(even[3], odd[3]) : SECOND_OF(even[3], odd[3]);
             const real of_around =
                 part == 0 ? FIRST_OF(even[4], odd[4]) : SECOND_OF(even[4], odd[4]);
-            const real cover = guide_lanes(alpha + pixel, 1, 0, 0, last), dark = DARK * cover;
+            const real dark = DARK * guide_lanes(alpha + pixel, 1, 0, 0, last);
+            const long plane = (long)height * width, row = (long)(2 * y + dy) * width;
+            const real lent =
+                (part == 0 ? FIRST_OF(even[5], odd[5]) : SECOND_OF(even[5], odd[5])) /
+                (lanes_at(shining + 3 * plane + row, width, x0) + LEAST_LIGHT);
 #endif
 #pragma unroll
             for (int c = 0; c < C; ++c) {
@@ -89,11 +96,11 @@ kernel void correct(
                                             : SECOND_OF(even[c % 3], odd[c % 3]);
                 const real before = guide_lanes(light + pixel * C, C, c, 0, last);
 #ifdef PICTURE
-                const long row = ((long)c * height + 2 * y + dy) * width;
-                const real taken = of_left * lanes_at(left + row, width, x0) +
-                                   of_around * lanes_at(around + row, width, x0);
-                const real part = 1 + cover * cover * (gain - 1);
-                values[c] = MAX((before + dark) * part - dark + taken, 0);
+                const long here = c * plane + row;
+                const real taken = of_left * lanes_at(left + here, width, x0) +
+                                   of_around * lanes_at(around + here, width, x0) +
+                                   lent * lanes_at(shining + here, width, x0);
+                values[c] = MAX((before + dark) * gain - dark + taken, 0);
 #else
                 values[c] = gain * before;
 #endif

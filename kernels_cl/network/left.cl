@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is left of a noisy picture beside the denoised one, fireflies no brighter than that
-// (`Read.left` of jflnr/network/picture.py).
+// What is left of a noisy picture beside the denoised one, fireflies no brighter than that, and what
+// shines, the brighter the more (`Read.left` and `Read.shining` of jflnr/network/picture.py).
 //
 // Defines: those of images.h, for C = 3 and no guides.
 
@@ -10,10 +10,11 @@
 #include "planes.h"
 #include "network/read.h"
 
-// light, noisy: (H, W, 3). weight: (H, W). to: (3, H, W). Global size (ceil(W / WIDTH), H).
+// light, noisy: (H, W, 3). weight: (H, W). left: (3, H, W). shining: (4, H, W), light times luminance,
+// and that. Global size (ceil(W / WIDTH), H).
 kernel void left_over(
     int width, int height, global const float *light, global const float *noisy,
-    global const float *weight, global float *to)
+    global const float *weight, global float *left, global float *shining)
 {
     const int x0 = (int)get_global_id(0) * WIDTH, y = get_global_id(1);
     if (x0 >= width || y >= height) return;
@@ -26,11 +27,15 @@ kernel void left_over(
         after[c] = guide_lanes(noisy + pixel * 3, 3, c, 0, last);
     }
     const real counts = guide_lanes(weight + pixel, 1, 0, 0, last);
-    const real most = (4 * luminance(before) + 0.1f) / MAX(luminance(after), 1e-6f);
+    const real bright = luminance(before);
+    const real most = (4 * bright + 0.1f) / MAX(luminance(after), 1e-6f);
     const real share = counts * MIN(most, 1);
+    const long plane = (long)height * width;
 #pragma unroll
-    for (int c = 0; c < 3; ++c)
-        write_lanes(
-            to + c * (long)height * width + pixel, width, x0,
-            counts > 0 ? share * after[c] - before[c] : (real)0);
+    for (int c = 0; c < 3; ++c) {
+        const real rest = counts > 0 ? share * after[c] - before[c] : (real)0;
+        write_lanes(left + c * plane + pixel, width, x0, rest);
+        write_lanes(shining + c * plane + pixel, width, x0, before[c] * bright);
+    }
+    write_lanes(shining + 3 * plane + pixel, width, x0, bright);
 }

@@ -67,7 +67,7 @@ def test_before_training_it_is_the_picture():
 def test_nothing_is_made_where_nothing_is(corrected):
     frame, result = corrected
     assert np.isfinite(result).all() and np.all(result >= 0)
-    assert np.all(result[:2] == 0) and np.any(result[..., :3] > 1.1 * frame.beauty.max() * 0.01)
+    assert np.all(result[:, :4] == 0) and np.any(result[..., :3] > 1.1 * frame.beauty.max() * 0.01)
     black = dataclasses.replace(frame, beauty=0 * frame.beauty)
     assert not jflnr.denoise(black, method())[..., :3].any()
 
@@ -151,15 +151,18 @@ def test_what_the_network_says_is_done_as_in_plain_numpy():
     light, noisy = random.exponential(size=(2, *size, 3))
     alpha, weight = random.random((2, *size, 1))
     weight *= random.random((*size, 1)) > 0.2
-    said = 2 * random.standard_normal((*size, 5))
+    said = 2 * random.standard_normal((*size, 6))
     colour = [0.2126, 0.7152, 0.0722]
     bright = [(image @ colour)[..., None] for image in (light, noisy)]
     share = weight * np.minimum(1, (4 * bright[0] + 0.1) / bright[1])
     left = np.where(weight > 0, share * noisy - light, 0)
     kernel = np.outer([1, 2, 1], [1, 2, 1])[..., None] / 16
-    around = scipy.ndimage.correlate(left, kernel, mode="nearest")
-    gains = 1 + alpha**2 * (np.exp(1.5 * np.tanh(said[..., :3] / 1.5)) - 1)
-    taken = np.tanh(said[..., 3:4]) * left + np.tanh(said[..., 4:]) * around
+    blur = lambda image: scipy.ndimage.correlate(image, kernel, mode="nearest")
+    near, all_near = (blur(blur(blur(x))) for x in (light * bright[0], bright[0]))
+    gains = np.exp(1.5 * np.tanh(said[..., :3] / 1.5))
+    shares = np.split(np.tanh(said[..., 3:]), 3, axis=-1)
+    offered = left, blur(left), near / (all_near + 1e-3)
+    taken = sum(share * image for share, image in zip(shares, offered, strict=True))
     expected = np.maximum((light + 0.02 * alpha) * gains - 0.02 * alpha + taken, 0)
     with jax.enable_x64(True):
         nothing = dict.fromkeys(Read._fields, jnp.zeros((*size, 1)))
@@ -241,5 +244,5 @@ def test_training_on_pictures_lowers_the_loss(record, monkeypatch):
     monkeypatch.setattr(examples, "CROP", 32)
     monkeypatch.setattr(train, "WARM_UP", 1)
     settings = train.Settings(PictureFLNR(**FEW), WIDTHS, batch=2, every=40, rate=1e-2)
-    history = train.train([record], [], settings, steps=160).history
+    history = train.train([record], [], settings, steps=320).history
     assert history[-1].loss < 0.8 * history[1].loss

@@ -6,7 +6,7 @@ import pytest
 
 import jflnr
 from jflnr.images.noisy_guides import holds_light
-from jflnr.regression.picture import Picture, WholePicture, denoise_picture, images_of
+from jflnr.regression.picture import Picture, WholePicture, denoise_picture, images_of, own_cover
 
 FEW = WholePicture(levels=2)
 
@@ -75,7 +75,7 @@ def test_light_that_the_albedo_holds_is_taken_from_it(rng, film):
     added = plain._replace(albedo=plain.albedo + own["emission"] + own["environment"])
     for one, lit in ((plain, False), (added, True)):
         assert holds_light(one.albedo, own["emission"] + own["environment"]) == lit
-        reflected = images_of(one, one, np.float32(1), lit)["surface"]
+        reflected = images_of(one, one, np.float32(4), np.float32(1), lit)["surface"]
         np.testing.assert_allclose(reflected, picture.albedo, atol=1e-5)
 
 
@@ -88,6 +88,23 @@ def test_a_transparent_film_stays_empty_and_alpha_gets_smoother(rng):
     y, x = np.mgrid[:HEIGHT, :WIDTH][..., None] + rng.random((2, HEIGHT, WIDTH, 2000))
     exact = np.mean((x - 17) ** 2 + (y - 13) ** 2 < 60, axis=-1, keepdims=True)
     assert np.mean((result.alpha - exact) ** 2) < np.mean((share - exact) ** 2)
+
+
+def test_alpha_keeps_what_its_noise_does_not_explain(rng):
+    """Of many samples nearly all, of one nothing, beside an independent sum over each window."""
+    filtered, noisy = rng.uniform(0, 1, (2, 9, 12, 1))
+    noisy[4, 5] = np.nan
+    for samples in (1, 4, 64):
+        taken = np.nan_to_num(noisy - filtered)
+        noise = filtered * (1 - filtered) / samples**1.25
+        expected = np.empty_like(filtered)
+        for y, x in np.ndindex(filtered.shape[:2]):
+            window = np.s_[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3]
+            square = np.sum(taken[window] ** 2)
+            share = max(square - np.sum(noise[window]), 0) / square
+            expected[y, x] = np.clip(filtered[y, x] + share * taken[y, x], 0, 1)
+        found = own_cover(noisy, filtered, np.full((9, 12, 1), samples))
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("missing", [(), ("depth",), ("depth", "position", "seen_normal")])

@@ -16,7 +16,7 @@ from experiments.rendering.camera import looking
 from experiments.rendering.picture import FILTER, Film, Lens, Shading, filter_offsets
 from experiments.rendering.scene import build
 from experiments.rendering.scenes import finishes
-from experiments.rendering.scenes.catalogue import FAMILIES, world_of
+from experiments.rendering.scenes.catalogue import FAMILIES, OF_PICTURES, world_of
 from experiments.rendering.scenes.geometry import quad, sphere
 from experiments.rendering.scenes.props import KINDS, Seen
 from experiments.rendering.scenes.world import Ball, Finish, Material, Surface, World, plain
@@ -194,7 +194,7 @@ def test_things_are_sound_and_of_the_size_of_what_is_seen(kind: Any) -> None:
             np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-4)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILIES | OF_PICTURES)
 def test_surfaces_of_a_family_get_finishes_by_seed(family: str) -> None:
     world = world_of(f"{family}-7")
     made, again = (finishes.dressed(world, np.random.default_rng(1)) for _ in range(2))

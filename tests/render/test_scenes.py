@@ -12,7 +12,7 @@ from experiments.rendering import views
 from experiments.rendering.lambertian import load_xml
 from experiments.rendering.scene import build
 from experiments.rendering.scenes import rooms
-from experiments.rendering.scenes.catalogue import CALM, FAMILIES, world_of
+from experiments.rendering.scenes.catalogue import CALM, FAMILIES, OF_PICTURES, world_of
 from experiments.rendering.scenes.world import World
 from experiments.rendering.source import load
 from experiments.rendering.tracer import Tracer
@@ -22,14 +22,14 @@ def _vertices(world: World) -> np.ndarray:
     return np.concatenate([s.mesh.vertices for s in world.surfaces])
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILIES | OF_PICTURES)
 def test_a_family_is_a_function_of_its_seed(family: str) -> None:
     world, again, other = (world_of(f"{family}-{seed}") for seed in (5, 5, 6))
     np.testing.assert_array_equal(_vertices(world), _vertices(again))
     assert _vertices(world).shape != _vertices(other).shape or not np.allclose(
         _vertices(world), _vertices(other)
     )
-    assert world.lookouts and world.sights
+    assert world.view or (world.lookouts and world.sights)
     for surface in world.surfaces:
         mesh, texture = surface.mesh, surface.material.texture
         assert np.isfinite(mesh.vertices).all() and mesh.faces.max() < len(mesh.vertices)

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from experiments.rendering.scenes import colonnade, forms, nature, night, palette, passages, rooms
+from experiments.rendering.scenes import (
+    airy,
+    colonnade,
+    forms,
+    nature,
+    night,
+    palette,
+    passages,
+    rooms,
+)
 from experiments.rendering.scenes.room import room
 from experiments.rendering.scenes.world import World
 
@@ -24,6 +33,9 @@ FAMILIES: dict[str, Callable[[int], World]] = {
     "lanterns": night.lanterns,
 }
 
+# Worth a picture with all its light and materials only.
+OF_PICTURES: dict[str, Callable[[int], World]] = {"airy": airy.airy}
+
 CALM = 2000  # the first seed of calm colours
 
 
@@ -37,8 +49,9 @@ def world_of(name: str) -> World:
     family, _, seed = name.partition("-")
     if name == "room":
         return room()
-    if family not in FAMILIES or not seed.isdigit():
-        known = ", ".join(f"{f}-SEED" for f in FAMILIES)
+    families = FAMILIES | OF_PICTURES
+    if family not in families or not seed.isdigit():
+        known = ", ".join(f"{f}-SEED" for f in families)
         raise ValueError(f"there is no scene {name!r} of ours: use room, {known}")
-    world = FAMILIES[family](int(seed))
+    world = families[family](int(seed))
     return world if int(seed) < CALM else palette.calm(world, int(seed))

@@ -80,6 +80,7 @@ class World:
     """Everything of a scene. `environment` is a latitude-longitude map `(h, w, 3)` or None.
 
     `lookouts` are points `(N, 3)` where a camera may stand and `sights` points worth looking at.
+    `transparent` is the share of its whole pictures whose film has no environment.
     """
 
     ao_distance: float
@@ -90,6 +91,7 @@ class World:
     sights: list[ArrayLike] = field(default_factory=list)
     fov_x: tuple[float, float] = (55.0, 80.0)
     view: Glimpse | None = None
+    transparent: float = 0.3
 
     def add(self, mesh: Mesh, material: Material, name: str = "") -> None:
         self.surfaces.append(Surface(mesh, material, None, name))
