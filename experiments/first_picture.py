@@ -86,8 +86,14 @@ def run(quick: bool) -> dict[str, Any]:
 def gradients(method: str) -> float:
     """Seconds to compile the gradient by light and normals, of 160 x 128 pixels."""
     command = [sys.executable, "-c", GRADIENTS, method, str(SHIPPED_FRAME)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=results.ROOT, check=True)
+    streams: dict[str, Any] = {"capture_output": True, "text": True}
+    done = subprocess.run(command, env=_variables(), cwd=results.ROOT, check=True, **streams)
     return float(done.stdout)
+
+
+def _variables() -> dict[str, str]:
+    """Those of this process that do not tell JAX where programs are kept."""
+    return {name: value for name, value in os.environ.items() if name[:4] not in ("JAX_", "TF_C")}
 
 
 def _picture(path: str) -> str:
@@ -103,8 +109,7 @@ def _picture(path: str) -> str:
 def _times(command: Sequence[str], kept: Path, quick: bool) -> dict[str, float]:
     """kept: a new folder for all that programs keep."""
     kept.mkdir(exist_ok=True)
-    own = {name: value for name, value in os.environ.items() if name[:4] not in ("JAX_", "TF_C")}
-    own |= dict.fromkeys(("HOME", "XDG_CACHE_HOME", "POCL_CACHE_DIR"), str(kept))
+    own = _variables() | dict.fromkeys(("HOME", "XDG_CACHE_HOME", "POCL_CACHE_DIR"), str(kept))
     seconds = []
     for _ in range(2 if quick else 1 + REPEATS):
         start = time.perf_counter()
