@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 import jflnr
 from experiments import data, plots, results
@@ -17,6 +19,7 @@ from jflnr.exr import read_channels
 from jflnr.frame import Array, Frame
 from jflnr.methods import PICTURES
 from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
+from jflnr.temporal.flicker import warped_error
 
 NAME = "whole"
 QUESTION = "How near does a whole picture come to Open Image Denoise?"
@@ -25,6 +28,7 @@ MINUTES = 15
 SAMPLES = 1, 4, 16, 64
 SIZES = (360, 640), (1080, 1920)
 REPEATS = 4
+SHOTS = Path("cache") / "shots"
 
 
 def folders() -> list[Path]:
@@ -53,7 +57,56 @@ def run(quick: bool) -> dict[str, Any]:
             if frame.alpha is not None:
                 films.append({"spp": spp, "picture": folder.name} | films_of(frame, folder))
     rows.sort(key=lambda row: row["spp"])
-    return {"pictures": [*rows, *means(rows)], "films": films, "times": times(quick)}
+    rows = [*rows, *means(rows)]
+    moving = [row for path in sorted(SHOTS.glob("*/000.exr")) for row in shot(path.parent)]
+    return {"pictures": rows, "films": films, "shots": moving, "times": times(quick)}
+
+
+def shot(folder: Path) -> list[dict[str, Any]]:
+    """By method: how much a shot flickers along its surfaces, and PSNR without the references'
+    noise, of all and of what is seen in mirrors and glass."""
+    frames = [jflnr.read_frame(path) for path in sorted(folder.glob("*.exr"))]
+    paths = {int(path.stem): path for path in sorted((folder / "references").glob("*.exr"))}
+    halves = {number: references(path) for number, path in paths.items()}
+    scale = exposure(np.stack([(a + b) / 2 for a, b in halves.values()]))
+    rows = []
+    for name, images in over_time(frames):
+        pairs = itertools.pairwise(zip(frames, images, strict=True))
+        changes = [warped_error((f, g), (a, b), scale) for (f, a), (g, b) in pairs]
+        errors = {n: squares(images[n], *both, scale) for n, both in halves.items()}
+        mirrored = np.concatenate([error[mirrors(frames[n])] for n, error in errors.items()])
+        psnr = lambda error: float(-10 * np.log10(np.mean(error)))
+        rows.append(
+            {
+                "shot": folder.name,
+                "method": name,
+                "warped": float(np.mean(changes)),
+                "psnr": psnr(np.stack([*errors.values()])),
+                "mirrors": psnr(mirrored),
+            }
+        )
+    return rows
+
+
+def over_time(frames: list[Frame]) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Pictures of a shot, `(H, W, 3)`: of ours frame by frame and with a history, and of OIDN."""
+    for method in PICTURES:
+        alone, history = (jflnr.Denoiser(method, backend="opencl") for _ in range(2))
+        for name, call in (("", alone), (", history", history.next)):
+            yield method + name, [np.asarray(call(frame))[..., :3] for frame in frames]
+    yield "OIDN", [oidn.prefiltered(frame.beauty, **auxiliaries(frame)) for frame in frames]
+
+
+def mirrors(frame: Frame) -> np.ndarray:
+    """Where something else is seen than the surface itself, `(H, W)`."""
+    apart = np.sum((np.asarray(frame.seen_normal) - np.asarray(frame.normal)) ** 2, axis=-1)
+    return uniform_filter(apart, 5) > 0.3
+
+
+def squares(image: Array, first: np.ndarray, second: np.ndarray, scale: float) -> np.ndarray:
+    """Squared error as displayed, without the noise of the halves of a reference, `(H, W)`."""
+    shown, a, b = (display(np.asarray(x, np.float64), scale) for x in (image, first, second))
+    return np.mean((shown - a) * (shown - b), axis=-1)
 
 
 def films_of(frame: Frame, folder: Path) -> dict[str, float]:

@@ -1,11 +1,13 @@
 """Scenes for whole pictures, rendered by Blender's Cycles, which nothing is fitted on.
 
     python experiments/rendering/blender.py SCENE... --out cache/pictures
+    python experiments/rendering/blender.py room --shot --out cache/shots
 
 needs Python 3.11 with `bpy==4.5.*` and `OpenEXR`, in an environment of their own. Per scene it
 writes `1spp.exr`, `4spp.exr` and `16spp.exr` as Blender does, and `reference.exr` from two
 independent halves. Everything is
-made of Blender's primitives; settings are its defaults, except that nothing is denoised.
+made of Blender's primitives; settings are its defaults, except that nothing is denoised. A shot has
+`000.exr`, ... of 4 samples, and `references/008.exr`, ... of every second frame from then on.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ from mathutils import Vector
 SIZE = 320, 180
 SAMPLES = 1, 4, 16
 HALF_SPP = 128
+# A shot: its frames, those with a reference, and samples of half of one.
+FRAMES, REFERENCED, SHOT_HALF_SPP = 20, range(8, 20, 2), 64
 PASSES = (
     *("z", "normal", "position", "emit", "environment"),
     *(f"{lobe}_{part}" for lobe in ("diffuse", "glossy", "transmission")
@@ -249,7 +253,7 @@ def settings() -> None:
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
-    for name in PASSES:
+    for name in (*PASSES, "vector"):
         setattr(layer, f"use_pass_{name}", True)
     layer.cycles.denoising_store_passes = True
     images = scene.render.image_settings
@@ -269,12 +273,12 @@ def combined(path: Path) -> dict[str, np.ndarray]:
     return {c: np.asarray(channels[f"ViewLayer.Combined.{c}"].pixels, np.float32) for c in "RGBA"}
 
 
-def reference(path: Path) -> None:
-    """Two halves of the samples: their mean, and the first of them."""
+def reference(path: Path, spp: int = HALF_SPP) -> None:
+    """Two halves of so many samples: their mean, and the first of them."""
     with tempfile.TemporaryDirectory() as folder:
         halves = [Path(folder) / f"{seed}.exr" for seed in (101, 202)]
         for half, seed in zip(halves, (101, 202), strict=True):
-            render(half, HALF_SPP, seed)
+            render(half, spp, seed)
         first, second = map(combined, halves)
     channels = {f"reference.{c}": (first[c] + second[c]) / 2 for c in first}
     channels |= {f"reference_a.{c}": first[c] for c in first}
@@ -282,10 +286,29 @@ def reference(path: Path) -> None:
     OpenEXR.File(header, channels).write(str(path))
 
 
+def shot(folder: Path) -> None:
+    """The camera goes sideways, and the monkey along and about itself, evenly."""
+    bpy.context.preferences.edit.keyframe_new_interpolation_type = "LINEAR"
+    scene = bpy.context.scene
+    for thing, by, turn in ((scene.camera, 0.6, 0), (bpy.data.objects["Suzanne"], 0.5, 70)):
+        for frame, share in ((-1, 0), (FRAMES, 1)):
+            thing.keyframe_insert("location", frame=frame)
+            thing.keyframe_insert("rotation_euler", frame=frame)
+            thing.location.x += by * (1 - share)
+            thing.rotation_euler[2] += radians(turn) * (1 - share)
+    (folder / "references").mkdir(parents=True, exist_ok=True)
+    for frame in range(FRAMES):
+        scene.frame_set(frame)
+        render(folder / f"{frame:03}.exr", 4, frame)
+        if frame in REFERENCED:
+            reference(folder / "references" / f"{frame:03}.exr", SHOT_HALF_SPP)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenes", nargs="+", choices=SCENES)
     parser.add_argument("--out", type=Path, default=Path("cache/pictures"))
+    parser.add_argument("--shot", action="store_true", help="frames in motion in place of pictures")
     arguments = parser.parse_args()
     for name in arguments.scenes:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -293,6 +316,9 @@ def main() -> None:
         settings()
         folder = (arguments.out / name).resolve()
         folder.mkdir(parents=True, exist_ok=True)
+        if arguments.shot:
+            shot(folder)
+            continue
         for spp in SAMPLES:
             render(folder / f"{spp}spp.exr", spp, spp)
         reference(folder / "reference.exr")
