@@ -102,10 +102,11 @@ class Read(NamedTuple):
 
         Factors on its light: what is dark may brighten where something covers it. How much it takes
         of what is left of the noisy picture, at the pixel and as a mean of those around; and of
-        what shines near it, which wires thinner than a pixel need where no sample met them.
+        what shines near it, which wires thinner than a pixel need where no sample met them, and the
+        less the more samples did not.
         """
         dark, left = DARK * self.alpha, self.left()
-        offered = left, _blurred(left), self.shining()
+        offered = left, _blurred(left), self.shining() / jnp.maximum(self.samples, 1)
         shares = jnp.split(jnp.tanh(said[..., COLOURS:]), len(offered), axis=-1)
         taken = sum(share * image for share, image in zip(shares, offered, strict=True))
         gains = factors(said[..., :COLOURS])

@@ -92,7 +92,7 @@ def correct_picture(context: Context, params: unet.Params, read: picture.Read) -
     around = blurred(context, left, lanes)
     for _ in range(picture.NEAR):
         shining = blurred(context, shining, lanes)
-    others = named["alpha"], left, around, shining
+    others = named["alpha"], named["samples"], left, around, shining
     written = {"PICTURE": 1, "LEAST_LIGHT": f"{picture.LEAST_LIGHT}f"} | DARK
     _write(context, said, others, named["light"], output, written)
     return context.finish(output, result)

@@ -39,14 +39,14 @@ INLINE real factor(real said)
 
 #ifdef PICTURE
 #define OTHERS                                                                                      \
-    global const float *alpha, global const float *left, global const float *around,               \
-        global const float *shining
+    global const float *alpha, global const float *samples, global const float *left,              \
+        global const float *around, global const float *shining
 #else
 #define OTHERS global const float *read
 #endif
 
 // said: a map of 4 SAID channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as
-// wide. light, output: (H, W, C) in float, alpha: (H, W), left, around: (3, H, W), shining: (4, H, W),
+// wide. light, output: (H, W, C) in float, alpha, samples: (H, W), left, around: (3, H, W), shining: (4, H, W),
 // as left.cl wrote it, blurred. Global size ((pitch - MARGIN) / WIDTH, h).
 kernel void correct(
     int width, int height, int h, int w, int pitch, global const float *said, OTHERS,
@@ -86,9 +86,10 @@ kernel void correct(
                 part == 0 ? FIRST_OF(even[4], odd[4]) : SECOND_OF(even[4], odd[4]);
             const real dark = DARK * guide_lanes(alpha + pixel, 1, 0, 0, last);
             const long plane = (long)height * width, row = (long)(2 * y + dy) * width;
+            const real bright = lanes_at(shining + 3 * plane + row, width, x0) + LEAST_LIGHT;
+            const real many = MAX(guide_lanes(samples + pixel, 1, 0, 0, last), 1);
             const real lent =
-                (part == 0 ? FIRST_OF(even[5], odd[5]) : SECOND_OF(even[5], odd[5])) /
-                (lanes_at(shining + 3 * plane + row, width, x0) + LEAST_LIGHT);
+                (part == 0 ? FIRST_OF(even[5], odd[5]) : SECOND_OF(even[5], odd[5])) / bright / many;
 #endif
 #pragma unroll
             for (int c = 0; c < C; ++c) {
