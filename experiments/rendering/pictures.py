@@ -15,6 +15,7 @@ from experiments.rendering.frame import RENDERER, Layers
 from experiments.rendering.materials import Dressed, dressed
 from experiments.rendering.picture import Film, Lens, Shading
 from experiments.rendering.sampling import stream_seed
+from experiments.rendering.scenes.world import World
 from experiments.rendering.source import Source
 from experiments.rendering.tracer import Tracer
 from jflnr.camera import Camera
@@ -40,7 +41,7 @@ def render(
     made = dressed(source, camera, guides, rng)
     tracer = Tracer.of(made.scene, camera, width, height)
     lens = _lens(rng, camera, width, height, guides["depth"])
-    transparent = 0.3 if source.world is None else source.world.transparent
+    transparent = (source.world or World).transparent
     film = _film(rng, made, camera, width, height, lens, transparent, stream_seed(seed, "pilot"))
     layers: Layers = {name: tracer.guides[name] for name in ("depth", "position")}
     for name, spp in streams().items():
