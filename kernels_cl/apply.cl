@@ -10,7 +10,7 @@
 // Defines beside those of the headers: STEP, distance of the models in pixels; RESTORED, if models are
 // multiplied by max(1 + rate * restored, 0) first, `restored` being (ceil(h / 2), restored_pitch), a
 // number for each 2 x 2 models (adaptive FLR, energy.cl). The models then lie as in models.h, and no
-// pixel is darker than `least` times the light of its block, `own` of floor.cl: as much of that is
+// pixel is darker than `least` times the light of its block, `own` of energy.cl: as much of that is
 // mixed in, into all channels alike, if there is any.
 
 #include "vectors.h"

@@ -44,7 +44,7 @@ kernel void error_step(
 }
 
 // The standard error of the brightness, (h, pitch), from the planes of the finest grid. own: from
-// floor.cl, scaled as in apply.cl. variance_part, left_out_part, detail: VARIANCE, LEFT_OUT and DETAIL of
+// energy.cl, scaled as in apply.cl. variance_part, left_out_part, detail: VARIANCE, LEFT_OUT and DETAIL of
 // uncertainty.py. Global size (pitch / WIDTH, h).
 #define FACTOR(i) MAX(1 + rate[0] * restored[(long)(y / 2) * restored_pitch + (x + (i)) / 2], 0)
 kernel void standard_error(

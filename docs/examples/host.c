@@ -245,7 +245,7 @@ static grid merge(cl_program merge_cl, cl_program halve_cl, level fine, level co
 static void flr_adaptive(void)
 {
     const float exponent = 1, offset = 0.2f, slack = 0.025f, least = 0.2f;
-    const cl_program halve_cl = build("resampling.cl", C, ""), energy_cl = build("energy.cl", C, "");
+    const cl_program halve_cl = build("resampling.cl", C, ""), energy_cl = build("energy.cl", C, LUMINANCE);
     const cl_program merge_cl = build("merge.cl", C, LUMINANCE);
     const cl_program pilot_cl = build("level.cl", 1, "-DNOISE=0 -DPOSITIONS=1" ITSELF);
     const cl_program level_cl = build("level.cl", C, "-DNOISE=1 -DPOSITIONS=1" LUMINANCE);
@@ -284,7 +284,7 @@ static void flr_adaptive(void)
     run(energy_cl, "restored_rows", h, 1, 1, "iiibbb", h, w, pitch, pass.planes, restored, partial);
     run(energy_cl, "restore", 1, 1, 1, "ifbbb", h, slack, partial, mean, rate);
     const grid own = new_grid(C, merged.h, merged.w);
-    run(build("floor.cl", C, LUMINANCE), "own_light", merged.pitch / lanes, merged.h, 1, "iibbb",
+    run(energy_cl, "own_light", merged.pitch / lanes, merged.h, 1, "iibbb",
         merged.h, merged.pitch, grids[0].planes, merged.planes, own.planes);
     const int strips = lanes > FINEST ? up(merged.w + 1, lanes / FINEST) : (merged.w + 1) * FINEST;
     run(build("apply.cl", C, "-DSTEP=4 -DRESTORED" LUMINANCE), "apply", strips, merged.h + 1, 1,

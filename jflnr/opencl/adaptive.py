@@ -18,8 +18,7 @@ from jflnr.opencl.arguments import (
     to_weight,
 )
 from jflnr.opencl.context import Context, default_context, is_device_array
-from jflnr.opencl.energy import frame_mean, rescale, restore
-from jflnr.opencl.floor import own_light
+from jflnr.opencl.energy import frame_mean, own_light, rescale, restore
 from jflnr.opencl.grids import Grid, Images, Run
 from jflnr.opencl.level import Level, fit_level, fit_pilot
 from jflnr.opencl.merge import choose, merge, signal_share

@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/energy.cl and rescale.cl; the twin is jflnr/regression/energy.py."""
+"""Host side of kernels_cl/energy.cl and rescale.cl; twins: energy.py and floor.py of regression."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ def frame_mean(run: Run, moments: Any, w: int) -> Any:
     """
     context, (h, pitch) = run.context, moments.shape[1:]
     partial, mean = context.empty((h, 2)), context.empty((2,))
-    defines = {"Q": run.guides, "C": run.channels, "WIDTH": 1}
+    defines = _defines(run)
     context.run("light_rows", "energy.cl", defines, (h,), (h, w, pitch, moments, partial))
     context.run("light_mean", "energy.cl", defines, (1,), (h, partial, mean))
     return mean
@@ -27,7 +27,7 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
     merged: the models of the finest grid. moments: of pass 1, on blocks twice as large, with w
     columns. Returns `(1,)` and `(h, pitch)`.
     """
-    context, defines = run.context, {"Q": run.guides, "C": run.channels, "WIDTH": 1}
+    context, defines = run.context, _defines(run)
     h, pitch = moments.shape[1:]
     output, partial, rate = (context.empty(shape) for shape in ((h, pitch), (h, 2), (1,)))
     blocks = h, w, pitch, *merged.sizes, moments, merged.planes, output
@@ -37,6 +37,23 @@ def restore(run: Run, merged: Grid, moments: Any, w: int) -> tuple[Any, Any]:
     total = h, run.numbers.slack, partial, run.mean, rate
     context.run("restore", "energy.cl", defines, (1,), total)
     return rate, output
+
+
+def own_light(run: Run, merged: Grid, moments: Grid) -> Grid:
+    """The light that each model gives at its block's mean guides, which is the floor of
+    jflnr/regression/floor.py: C planes.
+
+    merged: models. moments: of the same blocks.
+    """
+    h, w, pitch = merged.sizes
+    own = run.grid(run.channels, h, w)
+    arguments = h, pitch, moments.planes, merged.planes, own.planes
+    run.context.run("own_light", "energy.cl", _defines(run), (pitch, h), arguments)
+    return own
+
+
+def _defines(run: Run) -> dict[str, Any]:
+    return {"Q": run.guides, "C": run.channels, "WIDTH": 1} | brightness_defines(run.channels)
 
 
 def rescale(

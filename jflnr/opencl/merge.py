@@ -1,4 +1,4 @@
-"""Host side of kernels_cl/merge.cl; its twin in JAX is jflnr/regression/merge.py."""
+"""Host side of kernels_cl/merge.cl and choose.cl; its twin in JAX is jflnr/regression/merge.py."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def choose(run: Run, share: Grid, h: int, w: int) -> Any:
     `jflnr.regression.multiscale.chosen`. Returns `(ceil(h / GROUP), pitch / GROUP)`, uint8."""
     tiles = run.context.empty((-(-h // GROUP), -(-w // GROUP)), np.uint8)
     arguments = *share.sizes, tiles.shape[1], run.numbers.worth, share.planes, tiles
-    run.launch("choose", "merge.cl", share, arguments)
+    run.launch("choose", "choose.cl", share, arguments)
     return tiles
 
 
