@@ -25,7 +25,7 @@ class Stage:
     reach: pixels beyond a part that its results depend on. align: parts begin at multiples of so
     many pixels. totals: planes `(n, ...)` whose sums over the frame are wanted, given beside the
     others, with the side of their blocks. learn: what those sums, `(n,)` each, add to what is
-    known. composes: whether it puts the light into the picture, after any average over time.
+    known. composes: whether it puts the light into the picture, which needs pixels only.
     """
 
     run: Callable[[Any, Parts, Known], Parts]
@@ -55,13 +55,12 @@ def run(stages: Sequence[Stage], method: Any, parts: Parts, known: Known) -> tup
     return parts, known
 
 
-def regress(method: Any, images: Parts, composed: bool = True) -> Parts:
+def regress(method: Any, images: Parts) -> Parts:
     """What the last stage of a method gives for a whole frame: `image`, `(H, W, C)`, and more.
 
-    images: as the method's `images` makes them. composed: whether the light is put into the
-    picture, if the method does so.
+    images: as the method's `images` makes them.
     """
-    stages = [stage for stage in method.stages() if composed or not stage.composes]
+    stages = method.stages()
     parts, _ = run(stages, method, images, method.known(images))
     return {name: parts[name] for name in stages[-1].names}
 
@@ -70,14 +69,3 @@ def regress(method: Any, images: Parts, composed: bool = True) -> Parts:
 def on_frame(method: Any, frame: Any, names: tuple[str, ...]) -> Parts:
     """`regress` on the images that the method makes of a whole frame."""
     return regress(method, method.images(frame, names))
-
-
-def compose(method: Any, parts: Parts, known: Known | None = None) -> Parts:
-    """`image`, denoised light, put into the picture, and what else the last stage gives; nothing
-    for a method of light alone.
-
-    parts: what the method's `images` made, and the light. known: what the method takes besides.
-    """
-    stages = [stage for stage in method.stages() if stage.composes]
-    found = run(stages, method, parts, known or {})[0]
-    return {name: found[name] for stage in stages[-1:] for name in stage.names}

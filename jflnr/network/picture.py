@@ -129,10 +129,7 @@ class Read(NamedTuple):
 
 def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
     """The images that the network reads, from those of `picture` and its results, and the unit of
-    their light.
-
-    Over time a pixel weighs as much as the frames that it is a mean of.
-    """
+    their light."""
     xp: Any = parts["fitted"].__array_namespace__()
     unit = parts["brightness"]
     over = xp.where(unit > 0, unit, 1)
@@ -144,8 +141,7 @@ def to_read(parts: Parts, known: Known) -> tuple[Read, Any]:
     light = [shown(image) for image in (parts["fitted"], noisy, parts["noise"], parts["own"])]
     weight = parts["weight"][..., None]
     alpha = xp.ones_like(weight) if parts["alpha"] is None else xp.clip(parts["alpha"], 0, 1)
-    others = {"alpha": alpha, "weight": xp.minimum(weight, 1)}
-    others["samples"] = parts["surfaces"]["samples"] * xp.maximum(weight, 1)
+    others = {"alpha": alpha, "weight": weight}
     return Read(*light, **parts["surfaces"] | others), unit
 
 

@@ -15,11 +15,23 @@ from jflnr.opencl.context import Context, default_context
 from jflnr.opencl.grids import brightness_defines
 from jflnr.opencl.moments import guide_arguments, guide_defines, run_on_rows
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
-from jflnr.stages import compose
+from jflnr.opencl.temporal_picture import follow
+from jflnr.regression.picture import WholePicture
+from jflnr.temporal import picture
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.newly_seen import AROUND, BRIGHTER, NEAR
+from jflnr.temporal.picture import Past
 from jflnr.temporal.reproject import COSINE, OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import MODEL, PAST, TURNED, State, Temporal, guide_count, prepared
+from jflnr.temporal.sequence import (
+    MODEL,
+    PAST,
+    TURNED,
+    State,
+    Temporal,
+    guide_count,
+    named,
+    prepared,
+)
 
 
 def start(
@@ -28,10 +40,12 @@ def start(
     *,
     guides: Sequence[str] | None = None,
     context: Context | None = None,
-) -> State:
+) -> State | Past:
     """`jflnr.temporal.start`, on the device, of one light group."""
     context = default_context() if context is None else context
     checks.image("indirect", frame.indirect, 3)
+    if isinstance(named(frame, method), WholePicture):
+        return Past(*(context.array(np.asarray(zeros)) for zeros in picture.nothing(frame)))
     height, width = frame.normal.shape[:2]
     zeros = lambda channels: context.array(np.zeros((height, width, channels), np.float32))
     surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))
@@ -42,7 +56,7 @@ def start(
 
 @one_sentence()
 def step(
-    state: State,
+    state: Any,
     frame: Frame,
     method: Any = None,
     *,
@@ -51,7 +65,7 @@ def step(
     on_device: bool = False,
     guides: Sequence[str] | None = None,
     **options: Any,
-) -> tuple[State, Any]:
+) -> tuple[Any, Any]:
     """`jflnr.temporal.step` on an OpenCL device: same arguments, same result.
 
     state: from `start` or the frame before, its arrays on the device. The layers of the frame are
@@ -64,6 +78,11 @@ def step(
     method, names, inputs = prepared(state, frame, method, guides, options)
     filters = twins.filters_on(context)
     given = method.images(inputs, names, filters=filters)
+    if isinstance(state, Past):
+        found = twins.regress(method, given, context)
+        past = follow(context, state, found["image"], found["error"], frame.motion)
+        average: Any = past.picture
+        return past, average if on_device else average.get()
     layers = to_layers(context, given["guides"])
     sample, motion = (to_device(context, layer) for layer in (given["target"], frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
@@ -80,20 +99,13 @@ def step(
         context, light, kept, layers, change, sample, covered, least[0]
     )
     images = {"target": light.mean, "guides": kept, "guides_map": layers, "weight": weight}
-    fitted = twins.regress(method, images, context, to_picture=False, on_device=True)
-    fit, new = fitted["image"], (known, weight, surface.depth)
+    fit = twins.regress(method, images, context, on_device=True)["image"]
+    new = known, weight, surface.depth
     image, *_ = accumulate(context, image, None, (), change, fit, covered, least[1], new)
     result: Any = image.mean
-    averaged: Any = light.mean
     context.finish(result, result)
     state = State(surface, light, kept, image, evidence)
-    if not any(stage.composes for stage in method.stages()):
-        return state, result if on_device else result.get()
-    averages = {"target": averaged.get(), "weight": weight.get(), "image": result.get()}
-    averages |= {"error": fitted["error"].get()} if "error" in fitted else {}
-    shown = compose(method, given | averages, twins.known_on(context))
-    picture = np.asarray(shown["image"])
-    return state, context.array(picture) if on_device else picture
+    return state, result if on_device else result.get()
 
 
 def reproject(

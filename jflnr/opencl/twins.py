@@ -14,7 +14,7 @@ from jflnr.opencl.flr import flr
 from jflnr.opencl.network import correct_picture
 from jflnr.opencl.noisy_guides import smooth_guide
 from jflnr.opencl.shrink import shrink
-from jflnr.stages import Known, Parts, compose
+from jflnr.stages import Known, Parts, run
 
 # By the method's type.
 REGRESSIONS: dict[str, Callable[..., Any]] = {
@@ -43,20 +43,22 @@ def regress(
     method: Any,
     images: Parts,
     context: Context,
-    to_picture: bool = True,
     out: Any | None = None,
     **options: Any,
 ) -> Parts:
     """`jflnr.stages.regress` on the device.
 
-    to_picture: its `composed`. out: where `image` is to be. options: as of `flr`.
+    out: where `image` is to be. options: as of `flr`.
     """
     others = ("guides_map", "weight")
     given = {name: images[name] for name in others if images.get(name) is not None} | options
-    later = to_picture and any(stage.composes for stage in method.stages())
-    run = REGRESSIONS[type(method).__name__]
+    later = [stage for stage in method.stages() if stage.composes]
+    denoised = REGRESSIONS[type(method).__name__]
     given |= {"context": context, "out": None if later else out}
-    found = run(images["target"], images["guides"], method, **given)
+    found = denoised(images["target"], images["guides"], method, **given)
     found = found if isinstance(found, tuple) else (found,)
     parts = dict(zip(("image", "error"), found, strict=False))
-    return compose(method, images | parts, known_on(context)) if later else parts
+    if later:
+        found, _ = run(later, method, images | parts, known_on(context))
+        parts = {name: found[name] for name in later[-1].names}
+    return parts

@@ -1,10 +1,12 @@
 """Denoising frame after frame: one step function for all spatial methods (docs/temporal.md).
 
-The noisy light is averaged over time, and with it the guides, which say of what surfaces it is. The
-spatial method fits one to the other and evaluates the fit at this frame's guides; its results are
-averaged again. What the light has become since is found first and added to both averages.
+Whole pictures are denoised by themselves, and averaged then (`picture.py`). Of light the noisy one
+is averaged over time, and with it the guides, which say of what surfaces it is. The spatial method
+fits one to the other and evaluates the fit at this frame's guides; its results are averaged again.
+What the light has become since is found first and added to both averages.
 """
 
+import dataclasses
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -18,7 +20,9 @@ from jflnr.images.inputs import guides_of, prepare
 from jflnr.methods import default_of, method_of
 from jflnr.regression.adaptive import light_of
 from jflnr.regression.arguments import channel_count, layers_of
-from jflnr.stages import compose, regress
+from jflnr.regression.picture import WholePicture
+from jflnr.stages import regress
+from jflnr.temporal import picture
 from jflnr.temporal.accumulate import Average, accumulate, less_sure, nothing, reproject
 from jflnr.temporal.change import Change, Evidence, find_change, no_evidence
 from jflnr.temporal.newly_seen import bounded
@@ -61,9 +65,16 @@ class State(NamedTuple):
     evidence: Evidence
 
 
-def start(frame: Frame, method: Any = None, *, guides: Sequence[str] | None = None) -> State:
-    """The state before the first frame, of which only the shapes count. Arguments as of `step`."""
+def start(
+    frame: Frame, method: Any = None, *, guides: Sequence[str] | None = None
+) -> State | picture.Past:
+    """The state before the first frame, of which only the shapes count. Arguments as of `step`.
+
+    Returns a `State`, or of a method of whole pictures a `picture.Past`.
+    """
     checks.image("indirect", frame.indirect)
+    if isinstance(named(frame, method), WholePicture):
+        return picture.nothing(frame)
     height, width, channels = frame.indirect.shape
     surface = jax.tree.map(lambda layer: jnp.zeros(layer.shape), Surface.of(frame))
     light, image = (nothing(height, width, channels) for _ in range(2))
@@ -73,19 +84,24 @@ def start(frame: Frame, method: Any = None, *, guides: Sequence[str] | None = No
 
 def guide_count(frame: Frame, method: Any, guides: Sequence[str] | None) -> int:
     """Channels of the guides that a method takes of a frame; arguments as of `step`."""
-    method = method_of(default_of(frame) if method is None else method)
+    method = named(frame, method)
     return channel_count([getattr(frame, name) for name in guides_of(frame, guides, method)])
 
 
+def named(frame: Frame, method: Any, **options: Any) -> Any:
+    """The method that is meant for a frame."""
+    return method_of(default_of(frame) if method is None else method, **options)
+
+
 def step(
-    state: State,
+    state: Any,
     frame: Frame,
     method: Any = None,
     *,
     guides: Sequence[str] | None = None,
     temporal: Temporal = PAST,
     **options: Any,
-) -> tuple[State, jax.Array]:
+) -> tuple[Any, jax.Array]:
     """Denoise the next frame of a sequence.
 
     state: from `start` or from the frame before. frame: with `motion`; where only the camera moves
@@ -96,19 +112,22 @@ def step(
     Raises `ValueError` or `TypeError` naming the argument.
     """
     method, names, inputs = prepared(state, frame, method, guides, options)
+    if isinstance(state, picture.Past):
+        past = _picture_step(state, inputs, frame.motion, method, names)
+        return past, past.picture
     surface = jax.tree.map(jnp.asarray, Surface.of(frame))
     images = inputs, frame.motion, surface
-    light, kept, image, evidence, shown = _step(state, *images, method, temporal, names)
+    light, kept, image, evidence = _step(state, *images, method, temporal, names)
     # The surface and the image twice would be copied if the program returned them.
-    return State(surface, light, kept, image, evidence), image.mean if shown is None else shown
+    return State(surface, light, kept, image, evidence), image.mean
 
 
 def prepared(
-    state: State, frame: Frame, method: Any, guides: Sequence[str] | None, options: dict[str, Any]
+    state: Any, frame: Frame, method: Any, guides: Sequence[str] | None, options: dict[str, Any]
 ) -> tuple[Any, tuple[str, ...], Frame]:
     """The method for the frame, names of the guides and the layers to denoise, if all of it and the
     state fit together."""
-    method = method_of(default_of(frame) if method is None else method, **options)
+    method = named(frame, method, **options)
     if not hasattr(method, "stages"):
         raise ValueError(f"method {method.name} denoises frames by themselves, not over time")
     names, inputs = prepare(frame, guides, method)
@@ -120,11 +139,20 @@ def prepared(
         )
     checks.image("motion", frame.motion, 2)
     checks.same_size(indirect=frame.indirect, normal=frame.normal, motion=frame.motion)
-    if state.light.mean.shape != frame.indirect.shape:
+    if isinstance(method, WholePicture):
+        wanted, before = picture.shape_of(frame), getattr(state, "picture", None)
+        method = dataclasses.replace(method, with_error=True, lobes=False)
+    else:
+        wanted, before = frame.indirect.shape, getattr(state, "light", (None,))[0]
+    if before is None:
+        raise ValueError(f"the state is not of method {method.name}: start with the same method")
+    if before.shape != wanted:
         raise ValueError(
-            f"the state is of frames of shape {state.light.mean.shape}, and this frame's indirect "
-            f"is {frame.indirect.shape}: a sequence of another size needs a state of its own"
+            f"the state is of frames of shape {before.shape}, and this one is {wanted}: a sequence "
+            "of another size needs a state of its own"
         )
+    if isinstance(method, WholePicture):
+        return method.for_frame(inputs, names), names, inputs
     if (count := guide_count(frame, method, guides)) != state.guides.shape[2]:
         raise ValueError(
             f"the state is of {state.guides.shape[2]} channels of guides, and method {method.name} "
@@ -142,7 +170,7 @@ def _step(
     method: Any,
     temporal: Temporal,
     names: tuple[str, ...],
-) -> tuple[Average, jax.Array, Average, Evidence, jax.Array | None]:
+) -> tuple[Average, jax.Array, Average, Evidence]:
     images = method.images(frame, names)
     target, weight = jnp.asarray(images["target"]), images["weight"]
     channels = target.shape[-1]
@@ -169,12 +197,18 @@ def _step(
     weight = (1 + MODEL) * count / (1 + MODEL * count) * (1 if weight is None else weight)
     images |= {"target": light.mean[..., :channels], "weight": weight}
     mapped = {"guides": light.mean[..., channels:], "guides_map": images["guides"]}
-    fitted = regress(method, images | mapped, composed=False)
+    fitted = regress(method, images | mapped)
     fit = bounded(fitted["image"], known & covered, weight, surface.depth)
     image = accumulate(_changed(image, change), fit, temporal.image)
-    shown = compose(method, images | fitted | {"image": image.mean})
-    light, kept = Average(images["target"], light.samples), mapped["guides"]
-    return light, kept, image, evidence, shown.get("image")
+    return Average(images["target"], light.samples), mapped["guides"], image, evidence
+
+
+@functools.partial(jax.jit, static_argnames="names")
+def _picture_step(
+    past: picture.Past, frame: Frame, motion: Array, method: Any, names: tuple[str, ...]
+) -> picture.Past:
+    given = regress(method, method.images(frame, names))
+    return picture.follow(past, given["image"], given["error"], motion)
 
 
 def _with_guides(state: State) -> Average:
