@@ -115,7 +115,7 @@ def test_on_a_device_it_is_itself(corrected):
     np.testing.assert_allclose(error, told, rtol=1e-3, atol=1e-4)
 
 
-def test_over_time_it_corrects_the_averages():
+def test_over_time_its_pictures_are_averaged():
     """In JAX and on a device alike, and not as it corrects the frame alone."""
     random = np.random.default_rng(1)
     still = {"motion": np.zeros((HEIGHT, WIDTH, 2)), "alpha": np.ones((HEIGHT, WIDTH, 1))}
