@@ -18,7 +18,7 @@ from experiments.timing import interleaved
 from jflnr.exr import read_channels
 from jflnr.frame import Array, Frame
 from jflnr.methods import PICTURES
-from jflnr.metrics import display, exposure, flip, ssim, unbiased_mse
+from jflnr.metrics import display, exposure, flip, ssim
 from jflnr.temporal.flicker import warped_error
 
 NAME = "whole"
@@ -73,16 +73,15 @@ def shot(folder: Path) -> list[dict[str, Any]]:
     for name, images in over_time(frames):
         pairs = itertools.pairwise(zip(frames, images, strict=True))
         changes = [warped_error((f, g), (a, b), scale) for (f, a), (g, b) in pairs]
-        errors = {n: squares(images[n], *both, scale) for n, both in halves.items()}
+        errors = {n: squares(*shown(scale, images[n], *both)) for n, both in halves.items()}
         mirrored = np.concatenate([error[mirrors(frames[n])] for n, error in errors.items()])
-        psnr = lambda error: float(-10 * np.log10(np.mean(error)))
         rows.append(
             {
                 "shot": folder.name,
                 "method": name,
                 "warped": float(np.mean(changes)),
-                "psnr": psnr(np.stack([*errors.values()])),
-                "mirrors": psnr(mirrored),
+                "psnr": decibels(np.stack([*errors.values()])),
+                "mirrors": decibels(mirrored),
             }
         )
     return rows
@@ -103,26 +102,34 @@ def mirrors(frame: Frame) -> np.ndarray:
     return uniform_filter(apart, 5) > 0.3
 
 
-def squares(image: Array, first: np.ndarray, second: np.ndarray, scale: float) -> np.ndarray:
-    """Squared error as displayed, without the noise of the halves of a reference, `(H, W)`."""
-    shown, a, b = (display(np.asarray(x, np.float64), scale) for x in (image, first, second))
-    return np.mean((shown - a) * (shown - b), axis=-1)
+def shown(scale: float, *images: Array) -> list[np.ndarray]:
+    """Pictures as displayed."""
+    return [display(np.asarray(image, np.float64), scale) for image in images]
+
+
+def squares(image: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Squared error without the noise of the halves of a reference, `(H, W)`."""
+    return np.mean((image - first) * (image - second), axis=-1)
+
+
+def decibels(squares: np.ndarray) -> float:
+    """PSNR."""
+    return float(-10 * np.log10(np.mean(squares)))
 
 
 def films_of(frame: Frame, folder: Path) -> dict[str, float]:
     """PSNR of alpha without the noise of the references': noisy, ours, and OIDN's second pass."""
-    halves = [half[..., 0] for half in references(folder / "reference.exr", "A")]
-    alpha = np.asarray(frame.alpha)
+    halves = references(folder / "reference.exr", "A")
+    alpha = np.asarray(frame.alpha, np.float64)
     color, others = np.repeat(alpha, 3, axis=-1), auxiliaries(frame)
     films = {
-        "noisy": alpha[..., 0],
-        "ours": jflnr.denoise(frame, "picture")[..., 3],
-        "raw": oidn.layers(color=color, **others)[..., 0],
-        "clean": oidn.prefiltered(color, **others)[..., 0],
-        "alone": oidn.layers(color=color)[..., 0],
+        "noisy": alpha,
+        "ours": jflnr.denoise(frame, "picture")[..., 3:],
+        "raw": oidn.layers(color=color, **others)[..., :1],
+        "clean": oidn.prefiltered(color, **others)[..., :1],
+        "alone": oidn.layers(color=color)[..., :1],
     }
-    psnr = lambda film: -10 * np.log10(unbiased_mse(np.asarray(film, np.float64), *halves))
-    return {name: float(psnr(film)) for name, film in films.items()}
+    return {name: decibels(squares(film, *halves)) for name, film in films.items()}
 
 
 def times(quick: bool) -> list[dict[str, Any]]:
@@ -192,12 +199,11 @@ def auxiliaries(frame: Frame) -> dict[str, Any]:
 def metrics(image: Array, first: np.ndarray, second: np.ndarray) -> dict[str, float | None]:
     """Of displayed pictures: PSNR in dB without the noise of the halves, SSIM and FLIP."""
     scale = exposure((first + second) / 2)
-    shown, *halves = (display(np.asarray(x, np.float64), scale) for x in (image, first, second))
-    wanted = display((first + second) / 2, scale)
+    ours, wanted, *halves = shown(scale, image, (first + second) / 2, first, second)
     return {
-        "psnr": float(-10 * np.log10(unbiased_mse(shown, *halves))),
-        "ssim": ssim(shown, wanted),
-        "flip": flip(shown, wanted),
+        "psnr": decibels(squares(ours, *halves)),
+        "ssim": ssim(ours, wanted),
+        "flip": flip(ours, wanted),
     }
 
 
