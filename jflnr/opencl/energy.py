@@ -48,12 +48,14 @@ def own_light(run: Run, merged: Grid, moments: Grid) -> Grid:
     h, w, pitch = merged.sizes
     own = run.grid(run.channels, h, w)
     arguments = h, pitch, moments.planes, merged.planes, own.planes
-    run.context.run("own_light", "energy.cl", _defines(run), (pitch, h), arguments)
+    defines = _defines(run)
+    run.context.run("own_light", "energy.cl", defines, (pitch // defines["WIDTH"], h), arguments)
     return own
 
 
 def _defines(run: Run) -> dict[str, Any]:
-    return {"Q": run.guides, "C": run.channels, "WIDTH": 1} | brightness_defines(run.channels)
+    sizes = {"Q": run.guides, "C": run.channels, "WIDTH": run.context.width()}
+    return sizes | brightness_defines(run.channels)
 
 
 def rescale(
