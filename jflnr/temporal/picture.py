@@ -28,6 +28,8 @@ LEAST, AROUND = 0.05, 2
 EXPLAINED = 0.5
 # Light that is added before a slope is taken, and the least variance, in means of the picture.
 DARK, LEAST_NOISE = 0.1, 1e-9
+# No variance is larger, so that their sums are finite.
+MOST_NOISE = 1e37
 
 
 class Past(NamedTuple):
@@ -60,17 +62,18 @@ def follow(past: Past, picture: Array, error: Array, motion: Array) -> Past:
     shown = jnp.where(usable, jnp.maximum(picture, 0), 0)
     unit = mean_light(shown[..., :3])
     bright = light_of(shown[..., :3])[..., None] + DARK * unit
-    noise = divide(error, 2 * jnp.sqrt(bright)) ** 2 + LEAST_NOISE * unit + 1e-30
+    slope = divide(error, 2 * jnp.sqrt(bright))
+    noise = jnp.minimum(slope**2 + LEAST_NOISE * unit + 1e-30, MOST_NOISE)
     moved, certainty = moved_to(past, motion)
     seen, old = usable & (certainty > 0), divide(1, certainty)
     difference = (jnp.sqrt(moved) - jnp.sqrt(shown))[..., :3]
     apart = jnp.mean(difference**2, axis=-1, keepdims=True) - EXPLAINED * (old + noise)
-    apart, count = (
+    more, count = (
         combine(jnp.where(seen, plane, 0)[..., 0], AROUND, operator.add)[..., None]
         for plane in (apart, jnp.ones_like(old))
     )
-    old += jnp.maximum(apart, 0) / jnp.maximum(count, 1)
-    share = jnp.where(seen, jnp.maximum(old / (old + noise), LEAST), 1)
+    old = jnp.minimum(old + jnp.maximum(more, 0) / jnp.maximum(count, 1), MOST_NOISE)
+    share = jnp.where(seen, jnp.maximum(1 - noise / (old + noise), LEAST), 1)
     mean = jnp.where(seen, moved + share * (shown - moved), jnp.where(usable, shown, picture))
     return Past(mean, usable / (share**2 * noise + (1 - share) ** 2 * old))
 
@@ -87,7 +90,8 @@ def moved_to(past: Past, motion: Array) -> Past:
     x, y = jnp.arange(width) + motion[..., 0], jnp.arange(height)[:, None] + motion[..., 1]
     known &= (jnp.abs(2 * x + 1 - width) <= width) & (jnp.abs(2 * y + 1 - height) <= height)
     x, y = (jnp.clip(at, -1, size) for at, size in ((x, width), (y, height)))
-    images = jnp.where(past.certainty > 0, past.picture, 0), past.certainty
+    known_of = (past.certainty > 0) & jnp.isfinite(past.picture)
+    images = jnp.where(known_of, past.picture, 0), past.certainty
     results = []
     for image, weights, first in zip(images, (cubic, linear), (-1, 0), strict=True):
         rows, columns = (weights(at - jnp.floor(at)) for at in (y, x))

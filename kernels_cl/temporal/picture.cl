@@ -3,7 +3,7 @@
 // jflnr/temporal/picture.py, which says why.
 //
 // Defines beside those of vectors.h and BRIGHTNESS_0 to 2: CHANNELS of a picture, 3 or 4; AROUND,
-// pixels on each side that are compared; the numbers LEAST, EXPLAINED, DARK and LEAST_NOISE.
+// pixels on each side that are compared; the numbers LEAST, EXPLAINED, DARK, LEAST_NOISE and MOST_NOISE.
 
 #include "vectors.h"
 
@@ -47,8 +47,10 @@ kernel void compare(
             const float beside = (i == 1 ? 1 - (to_x - left) : to_x - left) *
                                  (j == 1 ? 1 - (to_y - top) : to_y - top);
             sure += both ? beside * certainty[tap] : 0;
-            for (int c = 0; c < CHANNELS; ++c)
-                sums[c] += certainty[tap] > 0 ? across[i] * down[j] * past[tap * CHANNELS + c] : 0;
+            for (int c = 0; c < CHANNELS; ++c) {
+                const float was = past[tap * CHANNELS + c];
+                sums[c] += certainty[tap] > 0 && 0 * was == 0 ? across[i] * down[j] * was : 0;
+            }
         }
     }
 
@@ -64,7 +66,8 @@ kernel void compare(
         apart += (sqrt(was) - sqrt(is)) * (sqrt(was) - sqrt(is)) / 3;
     }
     const float slope = bright > 0 ? error[pixel] / (2 * sqrt(bright)) : 0;
-    const float noise = slope * slope + LEAST_NOISE * unit + 1e-30f, old = seen ? 1 / sure : 0;
+    const float noise = MIN(slope * slope + LEAST_NOISE * unit + 1e-30f, MOST_NOISE);
+    const float old = seen ? 1 / sure : 0;
     planes[pixel] = old;
     planes[plane + pixel] = usable ? noise : -1;
     planes[2 * plane + pixel] = seen ? apart - EXPLAINED * (old + noise) : 0;
@@ -87,9 +90,9 @@ kernel void follow(
             count += counts[(long)v * width + u];
         }
     const float noise = planes[plane + pixel];
-    const float old = planes[pixel] + MAX(more, 0) / MAX(count, 1);
+    const float old = MIN(planes[pixel] + MAX(more, 0) / MAX(count, 1), MOST_NOISE);
     const int seen = counts[pixel] > 0, usable = noise >= 0;
-    const float share = seen ? MAX(old / (old + noise), LEAST) : 1;
+    const float share = seen ? MAX(1 - noise / (old + noise), LEAST) : 1;
     for (int c = 0; c < CHANNELS; ++c) {
         const float is = picture[pixel * CHANNELS + c], was = moved[pixel * CHANNELS + c];
         const float kept = usable ? MAX(is, 0) : is;
