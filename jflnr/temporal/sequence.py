@@ -106,7 +106,7 @@ def step(
 
     state: from `start` or from the frame before. frame: with `motion`; where only the camera moves
     `camera_motion` finds it, and zeros say that nothing does. The first frame's does not count.
-    method, guides, options: as of `jflnr.denoise`; a method that has stages.
+    method, guides, options: as of `jflnr.denoise`; a method that has stages. temporal: of light.
     Returns the state for the next frame, and `(H, W, C)`, what `jflnr.denoise` does.
 
     Raises `ValueError` or `TypeError` naming the argument.
@@ -139,21 +139,18 @@ def prepared(
         )
     checks.image("motion", frame.motion, 2)
     checks.same_size(indirect=frame.indirect, normal=frame.normal, motion=frame.motion)
-    if isinstance(method, WholePicture):
-        wanted, before = picture.shape_of(frame), getattr(state, "picture", None)
-        method = dataclasses.replace(method, with_error=True, lobes=False)
-    else:
-        wanted, before = frame.indirect.shape, getattr(state, "light", (None,))[0]
-    if before is None:
+    pictures = isinstance(method, WholePicture)
+    if pictures != isinstance(state, picture.Past):
         raise ValueError(f"the state is not of method {method.name}: start with the same method")
-    if before.shape != wanted:
+    before = (state.picture if pictures else state.light.mean).shape
+    if before != (wanted := picture.shape_of(frame) if pictures else frame.indirect.shape):
         raise ValueError(
-            f"the state is of frames of shape {before.shape}, and this one is {wanted}: a sequence "
-            "of another size needs a state of its own"
+            f"the state is of frames of shape {before}, and this one is {wanted}: a sequence of "
+            "another size needs a state of its own"
         )
-    if isinstance(method, WholePicture):
-        return method.for_frame(inputs, names), names, inputs
-    if (count := guide_count(frame, method, guides)) != state.guides.shape[2]:
+    if pictures:
+        method = dataclasses.replace(method, with_error=True, lobes=False)
+    elif (count := guide_count(frame, method, guides)) != state.guides.shape[2]:
         raise ValueError(
             f"the state is of {state.guides.shape[2]} channels of guides, and method {method.name} "
             f"takes {count} of this frame: start with the same method and guides"

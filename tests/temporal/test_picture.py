@@ -7,6 +7,8 @@ import jax
 import numpy as np
 import pytest
 
+import jflnr
+from jflnr import temporal
 from jflnr.opencl import Context, NoDevice
 from jflnr.opencl.temporal_picture import follow as follow_on_device
 from jflnr.temporal.picture import EXPLAINED, LEAST, Past, follow, moved_to
@@ -161,6 +163,20 @@ def test_alpha_goes_along(run: Follow) -> None:
         pictures.append(picture)
     alone = np.abs(pictures[-1] - truth(4)).mean((0, 1))
     assert np.all(np.abs(past.picture - truth(4)).mean((0, 1)) < 0.7 * alone)
+
+
+def test_a_state_of_something_else_is_refused() -> None:
+    image = np.ones((HEIGHT, WIDTH, 3), np.float32)
+    layers = {"indirect": image, "normal": image, "depth": image[..., :1], "motion": STILL}
+    light, seen = jflnr.Frame(**layers, ao=image[..., :1]), {"beauty": image, "seen_albedo": image}
+    whole = jflnr.Frame(**layers, **seen)
+    with pytest.raises(ValueError, match="the state is not of method picture"):
+        temporal.step(temporal.start(light), whole, "picture")
+    with pytest.raises(ValueError, match="the state is not of method flr"):
+        temporal.step(temporal.start(whole), light, "flr")
+    film = jflnr.Frame(**layers, **seen, alpha=image[..., :1])
+    with pytest.raises(ValueError, match=r"of shape \(40, 56, 3\), and this one is \(40, 56, 4\)"):
+        temporal.step(temporal.start(whole), film)
 
 
 @pytest.mark.parametrize("by", [(3, -2), (0.5, 0.25)])
