@@ -109,9 +109,14 @@ class ShotDenoiser:
         found = history.read(self.history)
         for name, value in _options(self.worker.arguments).items():
             if (other := found.about["options"].get(name, "None")) != value:
+                option = f"--{name.replace('_', '-')}"
+                made, now = (
+                    f"without {option}" if chosen == "None" else f"with {option} {chosen}"
+                    for chosen in (other, value)
+                )
                 raise ValueError(
-                    f"{self.history} was made with --{name.replace('_', '-')} {other}, and this is "
-                    f"{value}: delete it, or name another file"
+                    f"{self.history} was made {made}, and this is {now}: delete it, or name another "
+                    "file"
                 )
         return found
 
