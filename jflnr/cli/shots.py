@@ -115,8 +115,8 @@ class ShotDenoiser:
                     for chosen in (other, value)
                 )
                 raise ValueError(
-                    f"{self.history} was made {made}, and this is {now}: delete it, or name another "
-                    "file"
+                    f"{self.history} was made {made}, and this is {now}: delete it, or name "
+                    "another file"
                 )
         return found
 

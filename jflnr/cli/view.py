@@ -9,13 +9,10 @@ or change, are shown and denoised as they come.
 import argparse
 import contextlib
 import functools
-import sys
 import threading
 from collections.abc import Mapping
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 
@@ -35,10 +32,9 @@ EXAMPLES = """\
   jflnr view shot/ --port 8000         a folder that a renderer writes to
 """
 
+JSON = "text/plain"
 # What a page may ask to be denoised by: options of `jflnr denoise`.
 OPTIONS = ("method", "worth", "guides", "block", "backend")
-# The page's own scripts and styles, and this server; no other page may show it in itself.
-POLICY = "default-src 'unsafe-inline' 'self' data:; frame-ancestors 'none'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,13 +52,10 @@ def _port(text: str) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from jflnr.report.server import Server
+
     frames = Frames(arguments.input, arguments.spp, arguments.map)
-    try:
-        server = Server(("127.0.0.1", arguments.port), Handler)
-    except OSError as error:
-        raise OSError(f"port {arguments.port} cannot be used: {error.strerror}") from None
-    with server:
-        server.frames = frames
+    with Server(arguments.port, frames.answer) as server:
         where = f"http://127.0.0.1:{server.server_port}/"
         print(f"{where} shows {printable(arguments.input)}; Ctrl-C ends it", flush=True)
         server.serve_forever()
@@ -106,7 +99,7 @@ class Frames:
         frame = frame_of(source)
         return Loaded(Job(path, path), source, frame), frame
 
-    def page(self, asked: Mapping[str, str]) -> str:
+    def page(self) -> str:
         from jflnr.report import page
 
         choices = {"methods": [*HOMES], "backends": [AUTO, *BACKENDS]}
@@ -162,16 +155,17 @@ class Frames:
         arguments = parser.parse_args([*given, "-q", "-o", ".", str(self.path)])
         return Worker(settings_of(arguments), arguments, None)
 
-    def answer(self, what: str, asked: Mapping[str, str]) -> tuple[int, Any]:
-        """What a page asks for, and the code of HTTP: the page itself as text, else for JSON."""
-        answers = {"/": self.page, "/frames": self.names}
-        answers |= {"/scene": self.scene, "/denoise": self.denoised}
-        if what not in answers:
-            return 404, {"error": f"there is no {what}"}
+    def answer(self, what: str, asked: Mapping[str, str]) -> tuple[int, str, str]:
+        """The code of HTTP, and what a page asks for: the page itself, HTML, or else JSON."""
+        answers = {"/frames": self.names, "/scene": self.scene, "/denoise": self.denoised}
         try:
-            return 200, answers[what](asked)
+            if what == "/":
+                return 200, "text/html", self.page()
+            if what in answers:
+                return 200, JSON, to_json(answers[what](asked))
+            return 404, JSON, to_json({"error": f"there is no {what}"})
         except (*INPUT_ERRORS, argparse.ArgumentError) as error:
-            return 400, {"error": sentence(error)}
+            return 400, JSON, to_json({"error": sentence(error)})
 
 
 def told(error: np.ndarray, image: np.ndarray) -> np.ndarray:
@@ -180,42 +174,3 @@ def told(error: np.ndarray, image: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.log10(error[..., 0] / np.nanmean(np.abs(image))) / 4 + 0.75
     return np.clip(np.nan_to_num(share), 0, 1)
-
-
-class Server(ThreadingHTTPServer):
-    """One thread for each connection, since browsers keep some that they do not use."""
-
-    daemon_threads = True
-    frames: Frames
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        if not isinstance(sys.exception(), ConnectionError):  # the page was closed
-            super().handle_error(request, client_address)
-
-
-class Handler(BaseHTTPRequestHandler):
-    """Answers GET of the page that it serves, and of no other."""
-
-    server: Server
-
-    def do_GET(self) -> None:
-        where = urlsplit(self.path)
-        code, found = 403, {"error": "this is for the page of jflnr view only"}
-        if self._own():
-            code, found = self.server.frames.answer(where.path, dict(parse_qsl(where.query)))
-        kind, text = ("html", found) if isinstance(found, str) else ("plain", to_json(found))
-        self.send_response(code)
-        self.send_header("Content-Type", f"text/{kind}; charset=utf-8")
-        self.send_header("Content-Security-Policy", POLICY)
-        self.send_header("Cache-Control", "no-store")
-        self.end_headers()
-        self.wfile.write(text.encode(errors="replace"))
-
-    def _own(self) -> bool:
-        """Whether no other page asks, nor one of a name that was made to mean this machine."""
-        names = {f"{host}:{self.server.server_port}" for host in ("127.0.0.1", "localhost")}
-        site = self.headers.get("Sec-Fetch-Site", "none")
-        return self.headers.get("Host") in names and site in ("same-origin", "none")
-
-    def log_message(self, *_: Any) -> None:
-        """Who asked for what is of no interest."""
