@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from jflnr.frame import Frame
-from jflnr.methods import method_of
+from jflnr.methods import PICTURES, method_of
 from jflnr.opencl import temporal
 from jflnr.opencl.context import Context, Launch, is_device_array, source
 from jflnr.opencl.twins import REGRESSIONS
@@ -26,7 +26,8 @@ def launches(name: str, width: int, height: int, over_time: bool = False) -> lis
     light, normal, depth, ao, motion = (
         np.ones((height, width, channels), np.float32) for channels in (3, 3, 1, 1, 2)
     )
-    frame = Frame(indirect=light, normal=normal, depth=depth, ao=ao, motion=motion)
+    seen = {"beauty": light, "seen_albedo": light} if name in PICTURES else {}
+    frame = Frame(indirect=light, normal=normal, depth=depth, ao=ao, motion=motion, **seen)
     with context.recorded() as found:
         if over_time:
             state = temporal.start(frame, method, context=context)
