@@ -8,7 +8,7 @@ from jflnr.images.guides import mean_light
 from jflnr.opencl.arguments import to_device
 from jflnr.opencl.context import Context
 from jflnr.opencl.grids import brightness_defines
-from jflnr.temporal.picture import AROUND, DARK, EXPLAINED, LEAST, LEAST_NOISE, MOST_NOISE, Past
+from jflnr.temporal.picture import AROUND, DARK, EXPLAINED, LEAST, LEAST_NOISE, MOST, Past
 
 
 def follow(
@@ -24,7 +24,7 @@ def follow(
     moved, planes = context.empty(picture.shape), context.empty((4, height, width))
     defines: dict[str, Any] = {"WIDTH": 1, "CHANNELS": channels, "AROUND": AROUND}
     numbers = {"LEAST": LEAST, "EXPLAINED": EXPLAINED, "DARK": DARK}
-    numbers |= {"LEAST_NOISE": LEAST_NOISE, "MOST_NOISE": MOST_NOISE}
+    numbers |= {"LEAST_NOISE": LEAST_NOISE, "MOST": MOST}
     defines |= {name: f"{value}f" for name, value in numbers.items()} | brightness_defines(3)
     compared = width, height, float(unit), *images, to_device(context, motion), *past
     file, size = "temporal/picture.cl", (width, height)

@@ -28,8 +28,8 @@ LEAST, AROUND = 0.05, 2
 EXPLAINED = 0.5
 # Light that is added before a slope is taken, and the least variance, in means of the picture.
 DARK, LEAST_NOISE = 0.1, 1e-9
-# No variance is larger, so that their sums are finite.
-MOST_NOISE = 1e37
+# No light that is moved and no variance is larger, so that sums are finite.
+MOST = 1e37
 
 
 class Past(NamedTuple):
@@ -63,7 +63,7 @@ def follow(past: Past, picture: Array, error: Array, motion: Array) -> Past:
     unit = mean_light(shown[..., :3])
     bright = light_of(shown[..., :3])[..., None] + DARK * unit
     slope = divide(error, 2 * jnp.sqrt(bright))
-    noise = jnp.minimum(slope**2 + LEAST_NOISE * unit + 1e-30, MOST_NOISE)
+    noise = jnp.minimum(slope**2 + LEAST_NOISE * unit + 1e-30, MOST)
     moved, certainty = moved_to(past, motion)
     seen, old = usable & (certainty > 0), divide(1, certainty)
     difference = (jnp.sqrt(moved) - jnp.sqrt(shown))[..., :3]
@@ -72,10 +72,10 @@ def follow(past: Past, picture: Array, error: Array, motion: Array) -> Past:
         combine(jnp.where(seen, plane, 0)[..., 0], AROUND, operator.add)[..., None]
         for plane in (apart, jnp.ones_like(old))
     )
-    old = jnp.minimum(old + jnp.maximum(more, 0) / jnp.maximum(count, 1), MOST_NOISE)
-    share = jnp.where(seen, jnp.maximum(1 - noise / (old + noise), LEAST), 1)
-    mean = jnp.where(seen, moved + share * (shown - moved), jnp.where(usable, shown, picture))
-    return Past(mean, usable / (share**2 * noise + (1 - share) ** 2 * old))
+    old = jnp.minimum(old + jnp.maximum(more, 0) / jnp.maximum(count, 1), MOST)
+    kept = jnp.where(seen, jnp.minimum(noise / (old + noise), 1 - LEAST), 0)
+    mean = jnp.where(usable, shown + kept * (moved - shown), picture)
+    return Past(mean, usable / ((1 - kept) ** 2 * noise + kept**2 * old))
 
 
 def moved_to(past: Past, motion: Array) -> Past:
@@ -101,7 +101,7 @@ def moved_to(past: Past, motion: Array) -> Past:
                 row = jnp.clip(jnp.floor(y) + first + i, 0, height - 1).astype(jnp.int32)
                 column = jnp.clip(jnp.floor(x) + first + j, 0, width - 1).astype(jnp.int32)
                 total += (down * right)[..., None] * image[row, column]
-        results.append(jnp.maximum(total, 0))
+        results.append(jnp.clip(total, 0, MOST))
     picture, certainty = results
     return Past(picture, jnp.where(known[..., None], certainty, 0))
 

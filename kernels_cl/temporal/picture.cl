@@ -3,7 +3,7 @@
 // jflnr/temporal/picture.py, which says why.
 //
 // Defines beside those of vectors.h and BRIGHTNESS_0 to 2: CHANNELS of a picture, 3 or 4; AROUND,
-// pixels on each side that are compared; the numbers LEAST, EXPLAINED, DARK, LEAST_NOISE and MOST_NOISE.
+// pixels on each side that are compared; the numbers LEAST, EXPLAINED, DARK, LEAST_NOISE and MOST.
 
 #include "vectors.h"
 
@@ -59,14 +59,14 @@ kernel void compare(
     const int seen = inside && usable && sure > 0;
     float bright = DARK * unit, apart = 0;
     for (int c = 0; c < CHANNELS; ++c) {
-        const float was = MAX(sums[c], 0), is = MAX(picture[pixel * CHANNELS + c], 0);
+        const float was = CLAMP(sums[c], 0, MOST), is = MAX(picture[pixel * CHANNELS + c], 0);
         moved[pixel * CHANNELS + c] = was;
         if (c >= 3) continue;
         bright += (c == 0 ? BRIGHTNESS_0 : c == 1 ? BRIGHTNESS_1 : BRIGHTNESS_2) * is;
         apart += (sqrt(was) - sqrt(is)) * (sqrt(was) - sqrt(is)) / 3;
     }
     const float slope = bright > 0 ? error[pixel] / (2 * sqrt(bright)) : 0;
-    const float noise = MIN(slope * slope + LEAST_NOISE * unit + 1e-30f, MOST_NOISE);
+    const float noise = MIN(slope * slope + LEAST_NOISE * unit + 1e-30f, MOST);
     const float old = seen ? 1 / sure : 0;
     planes[pixel] = old;
     planes[plane + pixel] = usable ? noise : -1;
@@ -90,14 +90,13 @@ kernel void follow(
             count += counts[(long)v * width + u];
         }
     const float noise = planes[plane + pixel];
-    const float old = MIN(planes[pixel] + MAX(more, 0) / MAX(count, 1), MOST_NOISE);
+    const float old = MIN(planes[pixel] + MAX(more, 0) / MAX(count, 1), MOST);
     const int seen = counts[pixel] > 0, usable = noise >= 0;
-    const float share = seen ? MAX(1 - noise / (old + noise), LEAST) : 1;
+    const float kept = seen ? MIN(noise / (old + noise), 1 - LEAST) : 0;
     for (int c = 0; c < CHANNELS; ++c) {
-        const float is = picture[pixel * CHANNELS + c], was = moved[pixel * CHANNELS + c];
-        const float kept = usable ? MAX(is, 0) : is;
-        mean[pixel * CHANNELS + c] = seen ? was + share * (kept - was) : kept;
+        const float is = picture[pixel * CHANNELS + c], shown = usable ? MAX(is, 0) : is;
+        mean[pixel * CHANNELS + c] = shown + kept * (seen ? moved[pixel * CHANNELS + c] - shown : 0);
     }
-    const float variance = share * share * noise + (1 - share) * (1 - share) * old;
+    const float variance = (1 - kept) * (1 - kept) * noise + kept * kept * old;
     certainty[pixel] = usable ? 1 / variance : 0;
 }

@@ -140,7 +140,7 @@ def test_pixels_that_are_not_finite_stay_alone(run: Follow) -> None:
     np.testing.assert_array_equal(past.picture[10, 12], picture[10, 12])
 
 
-@pytest.mark.parametrize("light", [0.0, 1e-38, 1e37])
+@pytest.mark.parametrize("light", [0.0, 1e-38, 1.0, 1e37])
 def test_any_light_and_any_past_leave_numbers(run: Follow, light: float) -> None:
     """Also a past that a file was damaged to say."""
     random = np.random.default_rng(8)
@@ -148,10 +148,14 @@ def test_any_light_and_any_past_leave_numbers(run: Follow, light: float) -> None
     for image, bad in ((past.picture, np.nan), (past.picture, 3e38), (past.certainty, np.inf)):
         image.flat[:: random.integers(5, 50)] = bad
     past.certainty[5], past.certainty[6], past.certainty[7] = -1, np.nan, 3e38
+    past.picture[20:26, 20:30] = 3e38
     picture, error = noisy(random, 0.1)
     for _ in range(2):
         past = run(past, np.float32(light) * picture, np.float32(light) * error, STILL)
         assert np.isfinite(past.picture).all() and np.isfinite(past.certainty).all()
+    if light == 1:
+        inner = np.s_[21:25, 21:29]
+        np.testing.assert_allclose(past.picture[inner], picture[inner], rtol=1e-3)
 
 
 def test_alpha_goes_along(run: Follow) -> None:
