@@ -155,7 +155,7 @@ def test_any_light_and_any_past_leave_numbers(run: Follow, light: float) -> None
         assert np.isfinite(past.picture).all() and np.isfinite(past.certainty).all()
     if light == 1:
         inner = np.s_[21:25, 21:29]
-        np.testing.assert_allclose(past.picture[inner], picture[inner], rtol=1e-3)
+        np.testing.assert_allclose(past.picture[inner], picture[inner], rtol=0.02)
 
 
 def test_alpha_goes_along(run: Follow) -> None:
