@@ -41,12 +41,13 @@ import jax.numpy as jnp
 import jflnr
 frame = jflnr.read_frame(sys.argv[2]).map(lambda image: image[:128, :160])
 
-def error(light, normal):
+def error(light, normal, depth, ao):
     seen = frame.map(jnp.asarray)
-    seen = dataclasses.replace(seen, indirect=light, normal=normal)
+    seen = dataclasses.replace(seen, indirect=light, normal=normal, depth=depth, ao=ao)
     return jnp.mean((jflnr.denoise(seen, sys.argv[1]) - frame.reference) ** 2)
 
-traced = jax.jit(jax.grad(error, (0, 1))).trace(frame.indirect, frame.normal)
+images = frame.indirect, frame.normal, frame.depth, frame.ao
+traced = jax.jit(jax.grad(error, (0, 1, 2, 3))).trace(*images)
 start = time.perf_counter()
 traced.lower().compile()
 print(time.perf_counter() - start)
@@ -84,7 +85,7 @@ def run(quick: bool) -> dict[str, Any]:
 
 
 def gradients(method: str) -> float:
-    """Seconds to compile the gradient by light and normals, of 160 x 128 pixels."""
+    """Seconds to compile the gradient by light and guides, of 160 x 128 pixels."""
     command = [sys.executable, "-c", GRADIENTS, method, str(SHIPPED_FRAME)]
     streams: dict[str, Any] = {"capture_output": True, "text": True}
     done = subprocess.run(command, env=_variables(), cwd=results.ROOT, check=True, **streams)
