@@ -35,6 +35,7 @@ MARGIN = {
     "BMFR without TAA": "BMFR without TAA",
     "SVGF": "SVGF",
     "SVGF, tuned": "SVGF, tuned",
+    "OIDN of averages": "OIDN of averages",
 }
 
 

@@ -101,12 +101,11 @@ def methods() -> list[Method]:
         Method("SVGF", "peer", in_steps(svgf.start, svgf.step)),
         Method("SVGF, tuned", "peer", in_steps(svgf.start, tuned)),
     ]
-    oidn = [
-        Method("OIDN", "peer", functools.partial(each, denoise))
-        for denoise in oidn_peers()
-        if denoise.name == "OIDN, tuned"
-    ]
-    return [*alone, *ours, *peers, *oidn]
+    for denoise in oidn_peers():
+        if denoise.name == "OIDN, tuned":
+            peers.append(Method("OIDN", "peer", functools.partial(each, denoise)))
+            peers.append(Method("OIDN of averages", "peer", of_averages(denoise)))
+    return [*alone, *ours, *peers]
 
 
 def each(denoise: Callable[[Frame], Array], frames: Sequence[Frame]) -> list[np.ndarray]:
@@ -120,6 +119,22 @@ def with_history(method: Any) -> Callable[[Sequence[Frame]], list[np.ndarray]]:
     def run(frames: Sequence[Frame]) -> list[np.ndarray]:
         denoiser = jflnr.Denoiser(method)
         return [np.asarray(denoiser.next(frame)) for frame in frames]
+
+    return run
+
+
+def of_averages(
+    denoise: Callable[[Frame], Array],
+) -> Callable[[Sequence[Frame]], list[np.ndarray]]:
+    """Frame by frame, of the noisy light as a history of ours has averaged it."""
+
+    def run(frames: Sequence[Frame]) -> list[np.ndarray]:
+        denoiser, lights = jflnr.Denoiser("flr"), []
+        for frame in frames:
+            denoiser.next(frame)
+            average = np.asarray(denoiser.state.light.mean)
+            lights.append(np.asarray(denoise(dataclasses.replace(frame, indirect=average))))
+        return lights
 
     return run
 
