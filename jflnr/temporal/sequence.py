@@ -30,9 +30,9 @@ from jflnr.temporal.reproject import Surface, find_taps, own_turn
 
 # Variances of one frame that the averaged light and the averaged result, which has less noise, take
 # on by the squared turn of their surface: what falls on it depends on where it faces.
-TURNED = 2.0, 30.0
+TURNED = 8.0, 60.0
 # How wrong a model is, in variances of one frame, however many frames its pixels hold.
-MODEL = 0.3
+MODEL = 1.0
 
 
 class Temporal(NamedTuple):
