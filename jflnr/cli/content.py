@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 LOST = 0.02
 
 
-def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
-    """The samples per pixel of a file of ours."""
-    return arguments.spp if layouts.native.spp_present(source.channels) else None
-
-
 class Result(NamedTuple):
     """What became of a frame.
 
@@ -70,8 +65,10 @@ def channels_of(
     return channels if result.error is None else channels | {"error.Y": result.error[..., 0]}
 
 
-def about_of(frame: "Frame", denoiser: "Denoiser", spp: int | None) -> dict[str, Any]:
-    """What was done, for the record and for the header of the output."""
+def about_of(
+    frame: "Frame", denoiser: "Denoiser", source: layouts.Source, arguments: argparse.Namespace
+) -> dict[str, Any]:
+    """What was done, for the record and for the header of the output; `spp` of a file of ours."""
     from jflnr.images.inputs import guides_of
 
     method = denoiser.method_for(frame)
@@ -79,7 +76,7 @@ def about_of(frame: "Frame", denoiser: "Denoiser", spp: int | None) -> dict[str,
     return {
         "method": method.name,
         "backend": denoiser.backend,
-        "spp": spp,
+        "spp": arguments.spp if layouts.native.spp_present(source.channels) else None,
         "guides": guides_of(frame, denoiser.guides, method),
         **({"block": method.block} if hasattr(method, "block") else {}),
         **{name: float(getattr(method, name)) for name in names},

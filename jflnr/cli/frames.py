@@ -16,15 +16,7 @@ import jflnr
 from jflnr import layouts
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence
 from jflnr.cli.compiling import compiling_is_told
-from jflnr.cli.content import (
-    Pixels,
-    Result,
-    about_of,
-    channels_of,
-    result_of,
-    spp_of,
-    warnings_of,
-)
+from jflnr.cli.content import Pixels, Result, about_of, channels_of, result_of, warnings_of
 from jflnr.cli.jobs import Job, make_folder
 from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
 
@@ -59,12 +51,26 @@ class Denoised(NamedTuple):
     record: Record
 
 
+def stage(work: Callable[..., Any]) -> Callable[..., Any]:
+    """A stage of `Worker`. It returns a record where nothing is left to do, as the frame is there,
+    has failed or is written; later stages pass that on."""
+
+    @functools.wraps(work)
+    def run(worker: "Worker", given: Any, *more: Any) -> Any:
+        if isinstance(given, dict):
+            return given
+        try:
+            with np.errstate(all="ignore"):  # of any numbers in a file; what counts is said
+                return work(worker, given, *more)
+        except INPUT_ERRORS as error:
+            return failure(given if isinstance(given, Job) else given.job, error)
+
+    return run
+
+
 @dataclass
 class Worker:
     """Denoises files. Calling it does all of a frame's stages; threads may share them.
-
-    A stage returns a record where nothing is left to do: the frame is there, has failed or is
-    written; later stages pass that on.
 
     settings: keyword arguments of `jflnr.Denoiser`. arguments: of the command line. memory: bytes
     that frames may take, None for a share of what is free. at_once: how many may be in memory.
@@ -115,33 +121,9 @@ class Worker:
             return None
         return _record(job) | {"status": "kept", "kept": [str(path) for path in outputs]}
 
+    @stage
     def load(self, job: Job) -> Loaded | Record:
         """As `read`, also of a frame whose output is there."""
-        return self._reported(job, lambda: self._read(job))
-
-    def denoise(
-        self, loaded: Loaded | Record, given: Callable[["Frame"], Given] | None = None
-    ) -> Denoised | Record:
-        """given: what denoises instead of the denoiser; it may be called twice."""
-        if isinstance(loaded, dict):
-            return loaded
-        given = given or functools.partial(self._given, tile=loaded.tile)
-        return self._reported(loaded.job, lambda: self._denoise(loaded, given))
-
-    def write(self, denoised: Denoised | Record) -> Record:
-        if isinstance(denoised, dict):
-            return denoised
-        return self._reported(denoised.job, lambda: self._write(denoised))
-
-    def _reported(self, job: Job, stage: Callable[[], Any]) -> Any:
-        """What the stage returns, or the record of why it failed."""
-        try:
-            with np.errstate(all="ignore"):  # of any numbers in a file; what counts is said
-                return stage()
-        except INPUT_ERRORS as error:
-            return failure(job, error)
-
-    def _read(self, job: Job) -> Loaded:
         from jflnr import exr
         from jflnr.frame import frame_of
         from jflnr.large import memory
@@ -162,9 +144,11 @@ class Worker:
         tile = None if self.settings["backend"] == "opencl" else tile
         return Loaded(job, source, frame_of(source), tile)
 
-    def _denoise(
-        self, loaded: Loaded, denoise_frame: Callable[["Frame"], Given]
+    @stage
+    def denoise(
+        self, loaded: Loaded, instead: Callable[["Frame"], Given] | None = None
     ) -> Denoised | Record:
+        """instead: what denoises in place of the denoiser; it may be called twice."""
         from jflnr.metrics import measure
 
         job, source, frame, tile = loaded
@@ -175,6 +159,7 @@ class Worker:
             assert tile is not None
             return _record(job) | denoise_in_strips(job, self._another(tile=tile), arguments, tile)
         denoiser = self.denoiser_for(frame, tile)
+        denoise_frame = instead or functools.partial(_given, denoiser)
         method = denoiser.method_for(frame)
         measured = arguments.reference or arguments.fail_below is not None
         if measured and frame.reference is None:
@@ -194,7 +179,7 @@ class Worker:
             times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
-        about = about_of(frame, denoiser, spp_of(source, arguments))
+        about = about_of(frame, denoiser, source, arguments)
         result = result_of(frame, method, given)
         pixels = Pixels()
         pixels.add(frame, method, result.picture)
@@ -233,15 +218,8 @@ class Worker:
                 raise ValueError(f"{job.source}: its PSNR of {psnr:.2f} dB is below {least:g}")
         return Denoised(job, source, frame, result, about, record)
 
-    def _given(self, frame: "Frame", tile: int | None) -> Given:
-        denoiser = self.denoiser_for(frame, tile)
-        given = denoiser(frame)
-        if not isinstance(given, tuple):
-            return {"image": given}
-        names = denoiser.method_for(frame).stages()[-1].names
-        return dict(zip(names, given, strict=True))
-
-    def _write(self, done: Denoised) -> Record:
+    @stage
+    def write(self, done: Denoised) -> Record:
         """Write what is not there: the EXR, with the input's header and window, the preview."""
         from jflnr import exr
         from jflnr.cli.pictures import write_preview
@@ -261,6 +239,14 @@ class Worker:
                 write_preview(preview, result.picture, exposure(np.nan_to_num(result.lit)))
         self.exr_seconds["write"] += time.perf_counter() - start
         return _record(job) | {"status": "written"} | record
+
+
+def _given(denoiser: "jflnr.Denoiser", frame: "Frame") -> Given:
+    given = denoiser(frame)
+    if not isinstance(given, tuple):
+        return {"image": given}
+    names = denoiser.method_for(frame).stages()[-1].names
+    return dict(zip(names, given, strict=True))
 
 
 def _make_ready(

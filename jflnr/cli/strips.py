@@ -11,7 +11,7 @@ import numpy as np
 
 import jflnr
 from jflnr import exr, layouts, pfm
-from jflnr.cli.content import Pixels, about_of, channels_of, result_of, spp_of, warnings_of
+from jflnr.cli.content import Pixels, about_of, channels_of, result_of, warnings_of
 from jflnr.cli.jobs import Job
 from jflnr.frame import frame_of
 from jflnr.images.inputs import names_of, warn_without_ao
@@ -34,7 +34,7 @@ def denoise_in_strips(
     first = file.part(0, 1, (*layouts.LAYERS, *layouts.PICTURE))
     whole = frame_of(first)  # but for its size
     method = denoiser.method_for(whole)
-    about = about_of(whole, denoiser, spp_of(first, arguments))
+    about = about_of(whole, denoiser, first, arguments)
     comments = json.dumps(first.header | {"denoiser": about})
     size, window = (file.height, file.width), file.attributes.window
     others = file.attributes.others
