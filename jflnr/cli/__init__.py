@@ -22,17 +22,8 @@ EXAMPLES = """\
   jflnr denoise render.exr -o out/ --png      the clean picture, and a preview to look at
 """
 
-COMMANDS = {
-    "denoise": denoise,
-    "info": info,
-    "metrics": metrics,
-    "report": report,
-    "view": view,
-    "fit": fit,
-    "train": train,
-    "doctor": doctor,
-    "completion": completion,
-}
+MODULES = (denoise, info, metrics, report, view, fit, train, doctor, completion)
+COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -91,14 +82,12 @@ def parser() -> argparse.ArgumentParser:
     whole.add_argument("--version", action="version", version=__version__)
     commands = whole.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, module in COMMANDS.items():
-        summary = (module.__doc__ or "").partition("\n")[0].partition(": ")[2]
+        description = (module.__doc__ or "").partition(": ")[2]
         command = commands.add_parser(
             name,
-            help=summary,
-            description=(module.__doc__ or "").partition(": ")[2],
-            epilog=f"examples:\n{examples}"
-            if (examples := getattr(module, "EXAMPLES", ""))
-            else None,
+            help=description.partition("\n")[0],
+            description=description,
+            epilog=f"examples:\n{module.EXAMPLES}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )

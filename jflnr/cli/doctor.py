@@ -38,10 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.opencl.devices import NoDevice
 
-    found, missing = [], [*_lacking()]
+    found, missing = list[dict[str, str]](), [*_lacking()]
     try:
-        for device in _devices():
-            found.append(device)
+        found.extend(_devices())
     except NoDevice as error:
         missing.insert(0, str(error))
     there = {each.name: each.version for each in metadata.distributions()}

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 from jflnr.cli.common import guide_names, kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
+from jflnr.methods import method_of
+from jflnr.parameters import METHODS, numbers_of, save_parameters
 
 if TYPE_CHECKING:
     from jflnr.frame import Frame
@@ -27,16 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("frames", metavar="FRAME", nargs="+", type=Path, help="EXR frames, or folders of them")
     add("-o", "--output", metavar="OUT", type=Path, required=True, help="JSON file to write")
-    help = "flr, by SMAPE, or flr-adaptive, by PSNR and SMAPE (flr)"
-    add("--method", default="flr", choices=("flr", "flr-adaptive"), help=help)
-    add(
-        "--spp",
-        type=int,
-        nargs="+",
-        default=[1],
-        metavar="N",
-        help="take the noisy layers indirect_N (1)",
-    )
+    measured = "flr, by SMAPE, or flr-adaptive, by PSNR and SMAPE (flr)"
+    add("--method", default="flr", choices=METHODS, help=measured)
+    noisy = "take the noisy layers indirect_N (1)"
+    add("--spp", type=int, nargs="+", default=[1], metavar="N", help=noisy)
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--block", type=int, help="side of the squares of pixels that share one model")
     add("--steps", type=int, default=40, metavar="N", help="steps of L-BFGS at most (40)")
@@ -47,8 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.fitting import fit
     from jflnr.images.guides import choose
-    from jflnr.methods import method_of
-    from jflnr.parameters import numbers_of, save_parameters
 
     files = expand(arguments.frames)
     check_apart([arguments.output], files)
@@ -57,9 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     frames = [_read(file, spp) for file in files for spp in arguments.spp]
     guides = choose(frames[0], arguments.guides)
-    method = method_of(arguments.method)
-    if arguments.block is not None:
-        method = method_of(method, block=arguments.block)
+    options = {} if arguments.block is None else {"block": arguments.block}
+    method = method_of(arguments.method, **options)
     make_folder(arguments.output)
     print(f"frames: {len(frames)}, guides: {', '.join(guides) or 'none'}", flush=True)
     error = "SMAPE" if arguments.method == "flr" else "error"

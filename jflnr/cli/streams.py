@@ -33,10 +33,8 @@ def as_files(
         if inputs or not all(trio):
             raise ValueError("--hdr, --alb and --nrm are given together, in place of IN")
         named = zip(OF_OIDN.values(), trio[1:], strict=True)
-        inputs, layers = (
-            trio[:1],
-            [*layers, *((name, str(path.absolute())) for name, path in named)],
-        )
+        inputs = trio[:1]
+        layers = [*layers, *((name, str(path.absolute())) for name, path in named)]
     if not inputs:
         raise ValueError("IN is missing: EXR frames, folders of them, or - for standard input")
     if STREAM in inputs and len(inputs) > 1:

@@ -78,24 +78,11 @@ def run(arguments: argparse.Namespace) -> int:
     folder = arguments.cache or output.with_name(output.name + ".frames")
     method = method_of(arguments.method)
     records = [examples.prepared(path, folder, method) for path in _shown(paths)]
-    settings = Settings(
-        method=method,
-        widths=WIDTHS[arguments.method],
-        seed=arguments.seed,
-        batch=arguments.batch,
-        rate=arguments.rate,
-        every=arguments.every,
-    )
+    given = {name: getattr(arguments, name) for name in ("seed", "batch", "rate", "every")}
+    settings = Settings(method=method, widths=WIDTHS[arguments.method], **given)
     print("compiling, which may take minutes", flush=True)
-    result = train(
-        records,
-        kept,
-        settings,
-        seconds=arguments.time,
-        steps=arguments.steps or float("inf"),
-        state_file=state,
-        report=_report,
-    )
+    most = {"seconds": arguments.time, "steps": arguments.steps or float("inf")}
+    result = train(records, kept, settings, state_file=state, report=_report, **most)
     _write(output, result, settings, paths)
     print(f"best: step {result.best.step}{_decibels(result.best)} -> {printable(output)}")
     if result.stopped:
@@ -112,12 +99,8 @@ def _shown(paths: Sequence[Path]) -> Iterable[Path]:
 
 
 def _report(progress: "Progress") -> None:
-    minutes = progress.seconds / 60
-    print(
-        f"step {progress.step}, {minutes:.1f} minutes: loss {progress.loss:.3f}"
-        f"{_decibels(progress)}",
-        flush=True,
-    )
+    step = f"step {progress.step}, {progress.seconds / 60:.1f} minutes: loss {progress.loss:.3f}"
+    print(f"{step}{_decibels(progress)}", flush=True)
 
 
 def _decibels(progress: "Progress") -> str:
@@ -140,9 +123,9 @@ def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence
         seconds=round(result.best.seconds),
         validation_psnr={spp: round(v, 3) for spp, v in result.best.validation.items()},
     )
+    if result.stopped:  # there is no time for curves
+        return
     try:
-        if result.stopped:  # there is no time for it
-            return
         from matplotlib.figure import Figure
     except ImportError:
         return
