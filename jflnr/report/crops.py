@@ -30,14 +30,9 @@ def find_crops(scene: Scene, size: int = SIZE) -> list[dict[str, int]]:
 
 def _spread(scene: Scene) -> np.ndarray:
     """How far the errors of the versions lie apart at every pixel, as displayed, (H, W)."""
-    lights = {
-        name: np.nan_to_num(scene.radiance(image), posinf=0, neginf=0)
-        for name, image in scene.images.items()
-    }
-    basis = lights.get(REFERENCE, list(lights.values())[-1])
-    wanted = display(basis, exposure(basis))
-    judged = [n for n in lights if n not in (NOISY, REFERENCE)] or list(lights)
-    errors = [
-        np.mean((display(lights[name], exposure(basis)) - wanted) ** 2, axis=-1) for name in judged
-    ]
+    basis = scene.known(scene.judge)
+    scale = exposure(basis)
+    shown = lambda name: display(scene.known(scene.images[name]), scale)
+    judged = [n for n in scene.images if n not in (NOISY, REFERENCE)] or scene.images
+    errors = [np.mean((shown(name) - display(basis, scale)) ** 2, axis=-1) for name in judged]
     return np.ptp(errors, axis=0) if len(errors) > 1 else errors[0]

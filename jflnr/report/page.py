@@ -139,13 +139,12 @@ def unit_of(scene: Scene) -> float:
 def _exposures(scene: Scene) -> dict[str, float]:
     """The factor that each view is shown with: the metrics' rule, on what reflects."""
     judge = scene.judge
-    lights = {"reflected": scene.radiance(judge)}
+    lights = {"reflected": scene.known(judge)}
     if scene.frame is not None and not scene.whole:
         direct = 0 if scene.frame.direct is None else np.asarray(scene.frame.direct)
-        lights |= {"picture": scene.radiance(judge + direct), "light": judge}
-    return {
-        name: exposure(np.nan_to_num(light, posinf=0, neginf=0)) for name, light in lights.items()
-    }
+        light = np.nan_to_num(judge, posinf=0, neginf=0)
+        lights |= {"picture": scene.known(judge + direct), "light": light}
+    return {name: exposure(light) for name, light in lights.items()}
 
 
 def pack(image: np.ndarray, unit: float = 1) -> str:
