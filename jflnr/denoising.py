@@ -255,18 +255,16 @@ class Denoiser:
 
     def _over_time(self, frame: Frame) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """`start` and `step`, the method's own if it has them."""
-        method, name = self.method_for(frame), "jflnr.temporal"
-        own = hasattr(method, "step")
-        if self.backend == "jax" and own:
+        method, partial = self.method_for(frame), functools.partial
+        options = {"context": self.context} if self.backend == "opencl" else {}
+        if not hasattr(method, "step"):
+            home = importlib.import_module("jflnr.opencl.temporal" if options else "jflnr.temporal")
+            options |= {"method": method, "guides": self.guides}
+            return partial(home.start, **options), partial(home.step, **options)
+        if not options:
             return method.start, method.step
-        options: dict[str, Any] = {}
-        if self.backend == "opencl":
-            options["context"] = self.context
-            name = f"jflnr.opencl.{method.name if own else 'temporal'}"
-        home, taken = importlib.import_module(name), {} if own else {"guides": self.guides}
-        step = functools.partial(home.step, method=method, **taken, **options)
-        taken |= {} if own else {"method": method}
-        return functools.partial(home.start, **taken, **options), step
+        home = importlib.import_module(f"jflnr.opencl.{method.name}")
+        return partial(home.start, **options), partial(home.step, method=method, **options)
 
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:
