@@ -1,8 +1,8 @@
 """The command `jflnr`: one file per subcommand.
 
 Exit codes: 0 done, 2 something is wrong with what was asked or given, 3 some frames failed, 130
-interrupted. Modules here import numerical code inside the functions that run it, so that `--help`
-and `info` answer at once.
+interrupted. Modules here import JAX, and what imports it, inside the functions that run it, so that
+`--help` and `info` answer at once.
 """
 
 import argparse
@@ -33,8 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     arguments = parser().parse_args(argv)
     try:
-        with _silence() if getattr(arguments, "quiet", False) else contextlib.nullcontext():
-            code = arguments.run(arguments)
+        with open(os.devnull, "w") as nowhere:
+            quiet = getattr(arguments, "quiet", False)
+            with contextlib.redirect_stdout(nowhere if quiet else sys.stdout):
+                code = arguments.run(arguments)
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -56,12 +58,6 @@ def _drop_output() -> None:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
-        yield
 
 
 class _Parser(argparse.ArgumentParser):

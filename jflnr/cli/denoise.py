@@ -27,7 +27,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
-from jflnr import layouts
+from jflnr import cluster, layouts
 from jflnr.cli import shots, streams
 from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
@@ -35,6 +35,7 @@ from jflnr.cli.jobs import Job, borrowed, check_apart, plan
 from jflnr.cli.pipeline import pipelined
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
+from jflnr.large import memory
 from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
@@ -115,8 +116,6 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
     """named: puts what the user named into a text. piped: whether stdout is for the picture."""
     from tqdm import tqdm
 
-    from jflnr.large import memory
-
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in job.files]
     sources, others = [job.source for job in jobs], [arguments.history, arguments.log]
@@ -184,8 +183,6 @@ def _at_once(path: str, flags: int) -> int:
 
 def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:
     """What becomes of the frames, in the order in which they are finished."""
-    from jflnr import cluster
-
     if arguments.cluster is not None:
         # Workers on this machine share its memory.
         at_once = 1 if arguments.cluster else cluster.cores()

@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from jflnr.cli.common import table, to_json
+from jflnr.denoising import SHIPPED_FRAME, Denoiser
+from jflnr.frame import read_frame
 
 EXAMPLES = """\
   jflnr doctor
@@ -38,7 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.opencl.devices import NoDevice
 
-    found, missing = list[dict[str, str]](), [*_lacking()]
+    found = list[dict[str, str]]()
+    missing = [
+        f"{use} needs {module}: pip install '{package}'"
+        for module, (use, package) in OPTIONAL.items()
+        if importlib.util.find_spec(module) is None
+    ]
     try:
         found.extend(_devices())
     except NoDevice as error:
@@ -88,18 +95,8 @@ def _caches() -> Iterator[dict[str, Any]]:
             yield {"programs of": name, "folder": str(folder), "bytes": size}
 
 
-def _lacking() -> Iterator[str]:
-    """A line for each module that is not there, with the command that brings it."""
-    for module, (use, package) in OPTIONAL.items():
-        if importlib.util.find_spec(module) is None:
-            yield f"{use} needs {module}: pip install '{package}'"
-
-
 def _times(backend: str) -> dict[str, Any]:
     """How long one frame takes, and how long the first one did, with all that it loads."""
-    from jflnr.denoising import SHIPPED_FRAME, Denoiser
-    from jflnr.frame import read_frame
-
     frame, times = read_frame(SHIPPED_FRAME), [time.perf_counter()]
     denoiser = Denoiser("flr", backend=backend)
     for _ in range(2):

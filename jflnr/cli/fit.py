@@ -7,16 +7,13 @@ An OUT that exists is kept, which is no error, unless --overwrite is given.
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from jflnr.cli.common import guide_names, kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
+from jflnr.frame import Frame, read_frame
+from jflnr.images.guides import choose
 from jflnr.methods import method_of
 from jflnr.parameters import METHODS, numbers_of, save_parameters
-
-if TYPE_CHECKING:
-    from jflnr.frame import Frame
-
 
 EXAMPLES = """\
   jflnr fit frames/ -o params.json
@@ -42,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.fitting import fit
-    from jflnr.images.guides import choose
 
     files = expand(arguments.frames)
     check_apart([arguments.output], files)
@@ -81,9 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _read(path: Path, spp: int) -> "Frame":
-    from jflnr.frame import read_frame
-
+def _read(path: Path, spp: int) -> Frame:
     frame = read_frame(path, spp)
     if frame.reference is None:
         raise ValueError(f"{path}: fitting needs a layer reference, and there is none")

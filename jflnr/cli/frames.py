@@ -8,20 +8,20 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import jflnr
-from jflnr import layouts
+from jflnr import exr, layouts
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence
 from jflnr.cli.compiling import compiling_is_told
 from jflnr.cli.content import Pixels, Result, about_of, channels_of, result_of, warnings_of
 from jflnr.cli.jobs import Job, make_folder
+from jflnr.frame import Frame, frame_of
+from jflnr.large import memory
 from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
-
-if TYPE_CHECKING:
-    from jflnr.frame import Frame
+from jflnr.metrics import exposure, measure
 
 # Pixels on each side of what needs the same programs as a frame.
 CORNER = 64
@@ -36,7 +36,7 @@ class Loaded(NamedTuple):
 
     job: Job
     source: layouts.Source | None = None
-    frame: "Frame | None" = None
+    frame: Frame | None = None
     tile: int | None = None
 
 
@@ -45,7 +45,7 @@ class Denoised(NamedTuple):
 
     job: Job
     source: layouts.Source
-    frame: "Frame"
+    frame: Frame
     result: Result
     about: dict[str, Any]
     record: Record
@@ -85,14 +85,14 @@ class Worker:
     exr_seconds: dict[str, float] = field(default_factory=lambda: {"read": 0.0, "write": 0.0})
 
     @functools.cached_property
-    def denoiser(self) -> "jflnr.Denoiser":
+    def denoiser(self) -> jflnr.Denoiser:
         """What denoises; made where it is used, since it does not travel to another process."""
         return self._another()
 
-    def _another(self, **options: Any) -> "jflnr.Denoiser":
+    def _another(self, **options: Any) -> jflnr.Denoiser:
         return jflnr.Denoiser(**self.settings | options)
 
-    def denoiser_for(self, frame: "Frame", tile: int | None) -> "jflnr.Denoiser":
+    def denoiser_for(self, frame: Frame, tile: int | None) -> jflnr.Denoiser:
         """The one for a frame, which also cleans light passes if they are asked for."""
         whole = self.denoiser.method_for(frame).name in PICTURES
         if self.arguments.lobes and not whole:
@@ -124,10 +124,6 @@ class Worker:
     @stage
     def load(self, job: Job) -> Loaded | Record:
         """As `read`, also of a frame whose output is there."""
-        from jflnr import exr
-        from jflnr.frame import frame_of
-        from jflnr.large import memory
-
         start = time.perf_counter()
         attributes, method = exr.read_attributes(job.source), self.settings["method"]
         make_folder(job.target)
@@ -146,11 +142,9 @@ class Worker:
 
     @stage
     def denoise(
-        self, loaded: Loaded, instead: Callable[["Frame"], Given] | None = None
+        self, loaded: Loaded, instead: Callable[[Frame], Given] | None = None
     ) -> Denoised | Record:
         """instead: what denoises in place of the denoiser; it may be called twice."""
-        from jflnr.metrics import measure
-
         job, source, frame, tile = loaded
         arguments = self.arguments
         if source is None or frame is None:
@@ -202,17 +196,12 @@ class Worker:
         if arguments.explain:
             from jflnr.cli.pictures import explain
 
-            record["plan"] = explain(
-                job.explanation, frame, self.settings["method"], self.settings["guides"]
-            )
+            record["plan"] = explain(job.explanation, frame, method, denoiser.guides)
         if measured:
-            noisy, clean = frame.indirect, result.light
+            images = {"noisy": frame.indirect, "denoised": result.light}
             if frame.beauty is not None:
-                noisy, clean = frame.beauty, result.picture
-            images = {"noisy": noisy, "denoised": clean}
-            record["metrics"] = {
-                name: measure(frame, np.asarray(image)) for name, image in images.items()
-            }
+                images = {"noisy": frame.beauty, "denoised": result.picture}
+            record["metrics"] = {name: measure(frame, np.asarray(i)) for name, i in images.items()}
             psnr, least = record["metrics"]["denoised"]["psnr"], arguments.fail_below
             if least is not None and not psnr >= least:
                 raise ValueError(f"{job.source}: its PSNR of {psnr:.2f} dB is below {least:g}")
@@ -221,9 +210,7 @@ class Worker:
     @stage
     def write(self, done: Denoised) -> Record:
         """Write what is not there: the EXR, with the input's header and window, the preview."""
-        from jflnr import exr
         from jflnr.cli.pictures import write_preview
-        from jflnr.metrics import exposure
 
         start, arguments = time.perf_counter(), self.arguments
         job, source, frame, result, about, record = done
@@ -241,7 +228,7 @@ class Worker:
         return _record(job) | {"status": "written"} | record
 
 
-def _given(denoiser: "jflnr.Denoiser", frame: "Frame") -> Given:
+def _given(denoiser: jflnr.Denoiser, frame: Frame) -> Given:
     given = denoiser(frame)
     if not isinstance(given, tuple):
         return {"image": given}
@@ -250,7 +237,7 @@ def _given(denoiser: "jflnr.Denoiser", frame: "Frame") -> Given:
 
 
 def _make_ready(
-    denoiser: "jflnr.Denoiser", frame: "Frame", denoise_frame: Callable[["Frame"], Given]
+    denoiser: jflnr.Denoiser, frame: Frame, denoise_frame: Callable[[Frame], Given]
 ) -> None:
     """Have all programs for frames like this one, so that compiling is told from denoising."""
     if denoiser.backend == "jax":  # whose programs are for one size

@@ -12,6 +12,9 @@ import numpy as np
 
 from jflnr import exr, layouts
 from jflnr.cli.common import add_map, printable, table, to_json
+from jflnr.denoising import backend_for
+from jflnr.frame import Frame
+from jflnr.images.inputs import guides_of
 from jflnr.methods import AUTO, PICTURES, default_of, method_of
 
 EXAMPLES = """\
@@ -101,10 +104,6 @@ def _use(source: layouts.Source) -> dict[str, Any]:
         images = layouts.assemble(source)
     except ValueError as error:
         return use | {"usable": False, "why": str(error)}
-    from jflnr.denoising import backend_for
-    from jflnr.frame import Frame
-    from jflnr.images.inputs import guides_of
-
     frame = Frame(**images)
     method = default_of(frame)
     whole = method in PICTURES

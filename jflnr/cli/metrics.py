@@ -19,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from jflnr import layouts
+from jflnr import exr, layouts, metrics
 from jflnr.cli.common import add_map, metrics_table, to_json
+from jflnr.frame import frame_of
 
 EXAMPLES = """\
   jflnr metrics clean/room.exr room.exr       against the frame's own reference
@@ -46,9 +47,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def measure_files(a: Path, b: Path, spp: int, layers: Mapping[str, str]) -> dict[str, float | None]:
     """The metrics of file `a` against file `b`, as this module's docstring says."""
-    from jflnr import exr, metrics
-    from jflnr.frame import frame_of
-
     exr.check_aligned(a, b)
     channels_a, source = exr.read_channels(a), layouts.load(b, spp, layers)
     picture = functools.partial(layouts.picture, channels_a, str(a))

@@ -15,6 +15,7 @@ import argparse
 from pathlib import Path
 
 from jflnr.cli.common import add_map, kept_as_it_is, printable
+from jflnr.cli.jobs import borrowed, check_apart, expand, make_folder
 
 EXAMPLES = """\
   jflnr report room.exr out/room.exr -o report.html     a frame and what was denoised from it
@@ -37,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr.cli.jobs import borrowed, check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import Scene, collect
     from jflnr.report.shot import Shot, collect_shot

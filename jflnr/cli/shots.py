@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import functools
 import itertools
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jflnr import cluster
+from jflnr.cli.common import refuse
 from jflnr.cli.frames import Denoised, Given, Loaded, Record, Worker, failure
 from jflnr.cli.jobs import Job, natural
 from jflnr.cli.pipeline import pipelined
+from jflnr.frame import Frame
 
 if TYPE_CHECKING:
-    from jflnr.frame import Frame
     from jflnr.history import History
 
 # What a history depends on.
@@ -38,9 +39,8 @@ def wanted(arguments: argparse.Namespace) -> bool:
     """Whether frames are to be denoised as shots. Raises ValueError if something excludes that."""
     if not (arguments.temporal or arguments.history is not None or arguments.method == "bmfr"):
         return False
-    for name in ("error_map", "explain", "profile", "lobes"):
-        if getattr(arguments, name):
-            raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
+    alone = ("error_map", "explain", "profile", "lobes")
+    refuse(arguments, alone, "is for frames by themselves, not shots")
     if arguments.backend == "opencl" and arguments.history is not None:
         raise ValueError("--history keeps what the jax backend remembers: leave out --backend")
     return True
@@ -56,9 +56,7 @@ def records(worker: Worker, jobs: Sequence[Job], arguments: argparse.Namespace) 
         )
     if arguments.cluster is None:
         return itertools.chain.from_iterable(_denoised(worker, shot) for shot in shots)
-    from jflnr import cluster
-
-    whole = functools.partial(_finished, worker)
+    whole = lambda shot: list(_denoised(worker, shot))
     failed = lambda shot, error: [failure(job, error) for job in shot]
     return itertools.chain.from_iterable(cluster.each(arguments.cluster, whole, shots, failed))
 
@@ -69,10 +67,6 @@ def shots_of(jobs: Iterable[Job]) -> list[list[Job]]:
     for job in jobs:
         shots.setdefault(job.source.parent, []).append(job)
     return [sorted(shot, key=lambda job: natural(job.source)) for shot in shots.values()]
-
-
-def _finished(worker: Worker, shot: Sequence[Job]) -> list[Record]:
-    return list(_denoised(worker, shot))
 
 
 def _denoised(worker: Worker, shot: Sequence[Job]) -> Iterator[Record]:

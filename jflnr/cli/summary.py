@@ -51,13 +51,12 @@ def summary(record: dict[str, Any], verbose: bool) -> str:
     )
     if record["compile_seconds"]:
         text += f" (and {record['compile_seconds']:.1f} s to compile)"
+    lines = record.get("plan", [])
     if verbose:
         guides = ", ".join(record["guides"]) or "none"
-        lines = [f"layout: {record['layout']}", f"backend: {record['backend']}"]
-        lines += [f"guides: {guides}", *record["notes"]]
-        text += "".join(f"\n  {printable(line)}" for line in lines)
-    if "plan" in record:
-        text += "".join(f"\n  {printable(line)}" for line in record["plan"])
+        read = [f"layout: {record['layout']}", f"backend: {record['backend']}", f"guides: {guides}"]
+        lines = [*read, *record["notes"], *lines]
+    text += "".join(f"\n  {printable(line)}" for line in lines)
     if "metrics" in record:
         text += "\n" + metrics_table(record["metrics"])
     if "profile" in record:

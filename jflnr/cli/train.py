@@ -12,13 +12,15 @@ pixels, 60 MB for pictures.
 
 import argparse
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jflnr import checks
 from jflnr.cli.common import kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
 from jflnr.files import replacing
+from jflnr.methods import method_of
 
 if TYPE_CHECKING:
     from jflnr.network.train import Progress, Result, Settings
@@ -57,8 +59,8 @@ def seconds(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr import checks
-    from jflnr.methods import method_of
+    from tqdm import tqdm
+
     from jflnr.network import examples
     from jflnr.network.train import WIDTHS, Settings, train
 
@@ -77,7 +79,9 @@ def run(arguments: argparse.Namespace) -> int:
         state.unlink(missing_ok=True)
     folder = arguments.cache or output.with_name(output.name + ".frames")
     method = method_of(arguments.method)
-    records = [examples.prepared(path, folder, method) for path in _shown(paths)]
+    print(f"frames: {len(paths)}", flush=True)
+    shown = tqdm(paths, "preparing", leave=False, disable=None)
+    records = [examples.prepared(path, folder, method) for path in shown]
     given = {name: getattr(arguments, name) for name in ("seed", "batch", "rate", "every")}
     settings = Settings(method=method, widths=WIDTHS[arguments.method], **given)
     print("compiling, which may take minutes", flush=True)
@@ -89,13 +93,6 @@ def run(arguments: argparse.Namespace) -> int:
         print("stopped; the same command goes on from here", flush=True)
         raise KeyboardInterrupt
     return 0
-
-
-def _shown(paths: Sequence[Path]) -> Iterable[Path]:
-    from tqdm import tqdm
-
-    print(f"frames: {len(paths)}", flush=True)
-    return tqdm(paths, "preparing", leave=False, disable=None)
 
 
 def _report(progress: "Progress") -> None:
