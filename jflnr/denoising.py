@@ -270,10 +270,8 @@ class Denoiser:
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:
     """What the caller gets, as arrays of the frame's kind."""
     arrays = [parts["image"], *(array for name, array in parts.items() if name != "image")]
-    if isinstance(frame.indirect, np.ndarray):
-        arrays = [np.asarray(array) for array in arrays]
-    else:
-        arrays = [jax.numpy.asarray(array) for array in arrays]
+    kind = np if isinstance(frame.indirect, np.ndarray) else jax.numpy
+    arrays = [kind.asarray(array) for array in arrays]
     if out is not None:
         if arrays[0] is not out:
             np.copyto(out, arrays[0], casting="same_kind")

@@ -81,16 +81,15 @@ def fit(
     if any(frame.reference is None for frame in frames):
         raise ValueError("frames: every frame needs a reference to be fitted to")
     names = choose(frames[0], guides)
-    prepare, one = _adaptive, _adaptive_value_and_grad
+    prepare = _adaptive
     if isinstance(method, FLR):
-        prepare, one = _plain, _value_and_grad
-        method = dataclasses.replace(method, support=SUPPORT)
+        prepare, method = _plain, dataclasses.replace(method, support=SUPPORT)
     examples = [prepare(method, frame, choose(frame, names)) for frame in frames]
     values: list[float] = []
 
     def mean_loss(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
         # One frame at a time: memory for one, and one program for all frames of a size.
-        losses = [one(method, jnp.float32(logarithms), example) for example in examples]
+        losses = [_value_and_grad(method, jnp.float32(logarithms), example) for example in examples]
         value, slope = (sum(some) / len(some) for some in zip(*losses, strict=True))
         values.append(float(value))
         return values[-1], np.asarray(slope, np.float64)
@@ -138,9 +137,6 @@ def _loss(method: FLR, logarithms: jax.Array, example: Example) -> jax.Array:
     return smape(example.albedo * parts["image"], example.target)
 
 
-_value_and_grad = jax.jit(jax.value_and_grad(_loss, argnums=1))
-
-
 def _adaptive(method: Any, frame: Frame, names: tuple[str, ...]) -> Example:
     albedo, reference = np.asarray(frame.albedo), np.asarray(frame.reference)
     scale = np.float32(exposure(albedo * reference))
@@ -158,8 +154,10 @@ def _adaptive_loss(method: Any, logarithms: jax.Array, example: Example) -> jax.
 
 
 @jax.jit
-def _adaptive_value_and_grad(
+def _value_and_grad(
     method: Any, logarithms: jax.Array, example: Example
 ) -> tuple[jax.Array, jax.Array]:
+    if isinstance(method, FLR):
+        return jax.value_and_grad(_loss, argnums=1)(method, logarithms, example)
     value, slope = jax.value_and_grad(_adaptive_loss, argnums=1)(method, logarithms, example)
     return value, slope * jnp.minimum(1, LONGEST / jnp.maximum(jnp.linalg.norm(slope), 1e-12))
