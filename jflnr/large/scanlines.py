@@ -86,8 +86,7 @@ class Scanlines:
         """Whether the picture's alpha, if it has one, is 1 everywhere."""
         names = [name for name in self.layout.picture[3:] if name in self.channels]
         starts = range(0, self.height, BATCH) if names else ()
-        stops = (min(start + BATCH, self.height) for start in starts)
-        parts = (self._read(*rows, names) for rows in zip(starts, stops, strict=True))
+        parts = (self._read(top, min(top + BATCH, self.height), names) for top in starts)
         return all(np.all(part[name] == 1) for part in parts for name in names)
 
     def _shares(self) -> Shares:
