@@ -50,7 +50,8 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     views = _views(channels)
     if not views:
         return None
-    view = max(views, key=lambda view: _usefulness(views[view]))
+    # The one with the most layers; the compositor's own `Composite` has none.
+    view = max(views, key=lambda view: len(_find(views[view], PASSES | GUIDES)))
     light = _find(views[view], PASSES)
     if not {"indirect", "albedo"} <= set(light):
         light = _find(views[view], {"albedo": ("Denoising Albedo", *PASSES["albedo"])})
@@ -93,11 +94,6 @@ def _views(channels: Iterable[str]) -> dict[str, set[str]]:
         view, _, name = layer.rpartition(".")
         views.setdefault(view, set()).add(name)
     return {view: passes for view, passes in views.items() if "Combined" in passes}
-
-
-def _usefulness(passes: set[str]) -> int:
-    """How many of the layers there are; the compositor's own `Composite` has none."""
-    return len(_find(passes, PASSES | GUIDES))
 
 
 def _find(passes: Iterable[str], wanted: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
