@@ -197,10 +197,11 @@ def _header(
     """The header of an image of height and width `size`, but for its compression."""
     (x, y), display = window or Window()
     corners = (x, y, x + size[1] - 1, y + size[0] - 1)
+    box = lambda ends: (np.array(ends[:2], np.int32), np.array(ends[2:], np.int32))
     header = dict(others or {}) | {
         "type": OpenEXR.scanlineimage,
-        "dataWindow": _box(corners),
-        "displayWindow": _box(display or corners),
+        "dataWindow": box(corners),
+        "displayWindow": box(display or corners),
     }
     return header if comments is None else header | {"comments": comments}
 
@@ -366,10 +367,6 @@ def check_sizes(path: Path, channels: Mapping[str, np.ndarray]) -> None:
     if len(sizes) > 1:
         listed = ", ".join(f"{name} is {w} x {h}" for (h, w), name in sizes.items())
         raise ValueError(f"{path}: sizes disagree (width x height): {listed}")
-
-
-def _box(corners: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
 
 
 @contextlib.contextmanager
