@@ -289,17 +289,14 @@ def _read(path: Path, texts: Mapping[str, str], header_only: bool) -> list[_Part
     """texts: what some texts and names of the file stand for."""
     named = lambda text: texts.get(text, text)
     file = OpenEXR.File(os.fsencode(path), separate_channels=True, header_only=header_only)
-    return [
-        _Part(
-            part.name(),
-            {named(n): named(v) if isinstance(v, str) else v for n, v in header.items()},
-            {
-                named(channel.name): channel.pixels
-                for channel in (header["channels"] if header_only else part.channels.values())
-            },
-        )
-        for part, header in zip(file.parts, map(file.header, range(len(file.parts))), strict=True)
-    ]
+    parts = []
+    for i, part in enumerate(file.parts):
+        header = file.header(i)
+        stored = header["channels"] if header_only else part.channels.values()
+        header = {named(n): named(v) if isinstance(v, str) else v for n, v in header.items()}
+        channels = {named(channel.name): channel.pixels for channel in stored}
+        parts.append(_Part(part.name(), header, channels))
+    return parts
 
 
 def latin_1(name: str) -> str:

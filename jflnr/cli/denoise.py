@@ -31,8 +31,7 @@ from jflnr import cluster, layouts
 from jflnr.cli import shots, streams
 from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
-from jflnr.cli.jobs import Job, borrowed, check_apart, plan
-from jflnr.cli.pipeline import pipelined
+from jflnr.cli.jobs import Job, borrowed, check_apart, pipelined, plan
 from jflnr.cli.settings import settings_of
 from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
 from jflnr.large import memory

@@ -76,9 +76,9 @@ def _devices() -> Iterator[dict[str, str]]:
 
     from jflnr.opencl.devices import all_devices, kind
 
-    found = [(f"{d.platform}:{d.id}", d.device_kind, jax.__version__) for d in jax.devices()]
-    for name, what, driver in found:
-        yield {"backend": "jax", "device": name, "kind": what, "driver": driver}
+    for each in jax.devices():
+        name, what = f"{each.platform}:{each.id}", each.device_kind
+        yield {"backend": "jax", "device": name, "kind": what, "driver": jax.__version__}
     for number, device in enumerate(all_devices()):
         label, driver = f"{number}: {device.name.strip()}", device.version.strip()
         yield {"backend": "opencl", "device": label, "kind": kind(device), "driver": driver}

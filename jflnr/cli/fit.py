@@ -52,23 +52,11 @@ def run(arguments: argparse.Namespace) -> int:
     make_folder(arguments.output)
     print(f"frames: {len(frames)}, guides: {', '.join(guides) or 'none'}", flush=True)
     error = "SMAPE" if arguments.method == "flr" else "error"
-    result = fit(
-        frames,
-        method,
-        guides=guides,
-        steps=arguments.steps,
-        progress=lambda step, loss: print(f"step {step}: {error} {loss:.5f}", flush=True),
-    )
-    save_parameters(
-        arguments.output,
-        result.method,
-        guides=list(guides),
-        block=method.block,
-        spp=arguments.spp,
-        frames=len(frames),
-        before=result.before,
-        after=result.after,
-    )
+    say = lambda step, loss: print(f"step {step}: {error} {loss:.5f}", flush=True)
+    result = fit(frames, method, guides=guides, steps=arguments.steps, progress=say)
+    given = {"guides": list(guides), "block": method.block, "spp": arguments.spp}
+    about = given | {"frames": len(frames), "before": result.before, "after": result.after}
+    save_parameters(arguments.output, result.method, **about)
     numbers = ", ".join(f"{name} {n:.4g}" for name, n in numbers_of(result.method).items())
     print(
         f"{error} {result.before:.5f} before, {result.after:.5f} after, steps: {result.steps}\n"

@@ -20,8 +20,7 @@ import numpy as np
 from jflnr import cluster
 from jflnr.cli.common import refuse
 from jflnr.cli.frames import Denoised, Given, Loaded, Record, Worker, failure
-from jflnr.cli.jobs import Job, natural
-from jflnr.cli.pipeline import pipelined
+from jflnr.cli.jobs import Job, natural, pipelined
 from jflnr.frame import Frame
 
 if TYPE_CHECKING:
