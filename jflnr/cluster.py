@@ -72,12 +72,9 @@ def cores() -> int:
 
 def local_cluster(count: int) -> Any:
     """Dask workers on this machine, processes of one thread each; a context manager."""
+    quiet = {"dashboard_address": ":0", "silence_logs": logging.ERROR}
     return _distributed().LocalCluster(
-        n_workers=count,
-        threads_per_worker=1,
-        dashboard_address=":0",
-        memory_limit=0,
-        silence_logs=logging.ERROR,
+        n_workers=count, threads_per_worker=1, memory_limit=0, **quiet
     )
 
 

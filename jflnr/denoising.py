@@ -191,10 +191,10 @@ class Denoiser:
             return {name: np.concatenate([parts[name] for parts in found]) for name in found[0]}
         if self.backend == "jax":
             return on_frame(method, inputs, names)
-        from jflnr.opencl.twins import filters_on
+        from jflnr.opencl import twins
 
-        images = method.images(inputs, names, filters=filters_on(self.context))
-        return self._on_device(method)(images, out)
+        images = method.images(inputs, names, filters=twins.filters_on(self.context))
+        return twins.regress(method, images, self.context, out=out)
 
     def next(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise the next frame of a shot, with what those before it left (docs/temporal.md).
@@ -216,11 +216,6 @@ class Denoiser:
             return self._device
         return default_context() if self._device is None else Context(self._device)
 
-    def _on_device(self, method: Any) -> Callable[..., Parts]:
-        from jflnr.opencl import twins
-
-        return lambda images, out=None: twins.regress(method, images, self.context, out=out)
-
     def strips(
         self, rows: Rows, names: tuple[str, ...], tile: int, folder: Path | None = None
     ) -> Iterator[tuple[int, Parts]]:
@@ -238,7 +233,10 @@ class Denoiser:
         if self.backend == "jax":
             parts = tiled.strips(rows, method, names, tile, folder)
         else:
-            parts = tiled.overlapping(rows, method, names, tile, self._on_device(method))
+            from jflnr.opencl import twins
+
+            whole = lambda images: twins.regress(method, images, self.context)
+            parts = tiled.overlapping(rows, method, names, tile, whole)
         while True:
             with _own_settings(self.backend):  # which are the caller's own in between
                 found = next(parts, None)

@@ -20,6 +20,7 @@ import errno
 import functools
 import math
 import os
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -29,11 +30,11 @@ from typing import TextIO
 
 from jflnr import cluster, layouts
 from jflnr.cli import shots, streams
-from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
+from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, tinted, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
 from jflnr.cli.jobs import Job, borrowed, check_apart, pipelined, plan
 from jflnr.cli.settings import settings_of
-from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
+from jflnr.cli.summary import remarks, repeated, summary, throughput
 from jflnr.large import memory
 from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
@@ -152,7 +153,7 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
             for line in remarks(record, told):
                 say(line, loud)
             if "error" in record:
-                say(failed(record), err)
+                say(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}", err)
             else:
                 say(summary(record, arguments.verbose), results)
         for line in repeated(told):

@@ -16,7 +16,9 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
 
     Without a method it is None, and each frame gets its own, unless other options are of one.
     """
-    backend = _backend(arguments)
+    backend = arguments.backend
+    if backend == AUTO and (arguments.history is not None or arguments.profile):
+        backend = "opencl" if arguments.history is None else "jax"  # they leave no choice
     name = arguments.method
     if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
         name = DEFAULT
@@ -46,13 +48,6 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
         "backend": backend,
         "guides": about.get("guides") if arguments.guides is None else arguments.guides,
     }
-
-
-def _backend(arguments: argparse.Namespace) -> str:
-    """What is to run it; options that leave no choice make it for `auto`."""
-    if arguments.backend == AUTO and arguments.history is not None:
-        return "jax"
-    return "opencl" if arguments.backend == AUTO and arguments.profile else arguments.backend
 
 
 def _load(arguments: argparse.Namespace, method: Any) -> tuple[Any, dict[str, Any]]:

@@ -27,11 +27,6 @@ def _warning(what: str, text: str) -> str:
     return f"jflnr: {warning} {printable(what)}: {printable(text)}"
 
 
-def failed(record: dict[str, Any]) -> str:
-    """Why a frame failed, for stderr."""
-    return f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}"
-
-
 def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: float) -> str:
     """Frames per second, and how long files kept a thread busy. exr: seconds by `read`, `write`."""
     done = sum(record["status"] == "written" for record in records)

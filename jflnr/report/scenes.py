@@ -72,10 +72,7 @@ def of_frame(name: str, frame: Frame, denoised: dict[str, np.ndarray]) -> Scene:
 
 
 def collect(
-    paths: Sequence[Path],
-    spp: int,
-    reference: Path | None,
-    layers: Mapping[str, str] | None = None,
+    paths: Sequence[Path], spp: int, reference: Path | None, layers: Mapping[str, str] | None = None
 ) -> list[Scene]:
     """Read files of any kind and put together what belongs together.
 
