@@ -90,8 +90,7 @@ class Pixels:
     def add(self, frame: Frame, method: Any, picture: np.ndarray) -> None:
         whole = method.name in PICTURES
         names = method.features if whole else layouts.LAYERS
-        counts = not_finite(frame)
-        self.not_finite.update({name: n for name, n in counts.items() if name in names})
+        self.not_finite.update({n: c for n, c in not_finite(frame).items() if n in names})
         count, why = layouts.denoised(vars(frame), whole)
         self.denoised, self.why = self.denoised + count, self.why or why
         if whole:

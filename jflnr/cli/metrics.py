@@ -17,8 +17,6 @@ import functools
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from jflnr import exr, layouts, metrics
 from jflnr.cli.common import add_map, metrics_table, to_json
 from jflnr.frame import frame_of
@@ -52,14 +50,12 @@ def measure_files(a: Path, b: Path, spp: int, layers: Mapping[str, str]) -> dict
     picture = functools.partial(layouts.picture, channels_a, str(a))
     if "reference" in {*exr.layers_of(source.channels), *layers}:
         frame = frame_of(source)
-        light = _light(channels_a, spp, a) if frame.beauty is None else picture()
-        return metrics.measure(frame, light)
+        if frame.beauty is not None:
+            return metrics.measure(frame, picture())
+        light = "indirect" if "indirect.R" in channels_a else f"indirect_{spp}"
+        names = tuple(f"{light}.{c}" for c in "RGB")
+        return metrics.measure(frame, layouts.layer(channels_a, "indirect", names, str(a)))
     if "beauty" in layers:
         names = source.layout.channels["beauty"]
         return metrics.compare(picture(), layouts.layer(source.channels, "beauty", names, str(b)))
     return metrics.compare(picture(), layouts.picture(source.channels, str(b)))
-
-
-def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:
-    layer = "indirect" if "indirect.R" in channels else f"indirect_{spp}"
-    return layouts.layer(channels, "indirect", tuple(f"{layer}.{c}" for c in "RGB"), str(path))

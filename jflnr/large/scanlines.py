@@ -44,9 +44,7 @@ def _opened(path: Path) -> Any:
     """The open file; OpenImageIO takes no names that are not UTF-8."""
     open_file = _openimageio().ImageInput.open
     with tempfile.TemporaryDirectory() as folder:
-        try:
-            str(path).encode()
-        except UnicodeEncodeError:
+        if not str(path).isprintable():
             link = Path(folder) / "link.exr"
             link.symlink_to(path.resolve())
             path = link
