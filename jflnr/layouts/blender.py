@@ -20,7 +20,7 @@ LOBES = {
     lobe: [(f"{lobe} {part}", f"{short}{part[:3]}") for part in ("Color", "Direct", "Indirect")]
     for lobe, short in SHORT.items()
 }
-PASSES = dict(zip(("albedo", "direct", "indirect"), LOBES["Diffuse"], strict=True))
+PASSES = dict(zip(("indirect", "direct", "albedo"), reversed(LOBES["Diffuse"]), strict=True))
 # `Noisy Image` is the picture before Blender's own denoiser, which `Combined` is after.
 BEAUTY = ("Noisy Image", "Combined")
 WHOLE_PICTURE = {
