@@ -16,8 +16,7 @@ from experiments import mosaic
 from experiments.results import Parts
 from jflnr.cli import parser
 from jflnr.cli.frames import Worker, failure
-from jflnr.cli.jobs import Job, plan
-from jflnr.cli.pipeline import pipelined
+from jflnr.cli.jobs import Job, pipelined, plan
 from jflnr.cli.settings import settings_of
 from jflnr.cluster import cores, each, local_cluster
 from jflnr.large import memory

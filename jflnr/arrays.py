@@ -57,8 +57,7 @@ def restore(arrays: Mapping[str, np.ndarray], like: Any) -> Any:
         raise ValueError(
             f"array {name[:80]} has shape {found.get(name)} and should have {shapes.get(name)}"
         )
-    types = (getattr(leaf, "dtype", None) for leaf in leaves.values())
-    restored = [np.asarray(arrays[n], dtype) for n, dtype in zip(leaves, types, strict=True)]
+    restored = [np.asarray(arrays[n], getattr(x, "dtype", None)) for n, x in leaves.items()]
     return jax.tree.unflatten(jax.tree.structure(like), restored)
 
 

@@ -70,11 +70,5 @@ def same_size(**images: Any) -> None:
 
 def times_finer(fine: tuple[int, ...], coarse: tuple[int, ...]) -> int | None:
     """The smallest f with `coarse = ceil(fine / f)` in both directions; None if there is none."""
-    first = max(-(-f // c) for f, c in zip(fine, coarse, strict=True))
-    for factor in range(first, max(fine) + 1):
-        rows, columns = (-(-size // factor) for size in fine)
-        if (rows, columns) == coarse:
-            return factor
-        if rows < coarse[0] or columns < coarse[1]:
-            break
-    return None
+    factor = max(-(-f // c) for f, c in zip(fine, coarse, strict=True))
+    return factor if tuple(-(-size // factor) for size in fine) == coarse else None

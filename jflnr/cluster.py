@@ -5,7 +5,8 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from concurrent.futures import CancelledError
+from contextlib import nullcontext
 from typing import Any
 
 # How often a job is given to another worker after the one that had it died.
@@ -29,7 +30,9 @@ def each(
     Raises ImportError without Dask, OSError if no scheduler answers.
     """
     left = dict(enumerate(jobs))
-    with _cluster(address) as scheduler:
+    workers: Any = nullcontext() if address else local_cluster(cores())
+    with workers as local:
+        scheduler = address or local.scheduler_address
         deadline = time.monotonic() + (PATIENCE if address else 0)
         known = False
         while left:
@@ -39,7 +42,7 @@ def each(
                     for number, result, error in _finished(client, work, left):
                         job = left.pop(number)
                         yield result if error is None else failed(job, error)
-            except _connection_errors() as error:
+            except (OSError, CancelledError) as error:
                 if not known or time.monotonic() > deadline:
                     raise OSError(f"--cluster: no scheduler answers at {scheduler}") from error
                 print(f"The scheduler at {scheduler} is gone; waiting for it.", file=sys.stderr)
@@ -50,13 +53,11 @@ def _finished(
     client: Any, work: Callable[[Any], Any], left: dict[int, Any]
 ) -> Iterator[tuple[int, Any, BaseException | None]]:
     """Number, result and error of the jobs as they are finished."""
-    from distributed import as_completed
-
     futures = {
         client.submit(work, job, pure=False, retries=RETRIES): number
         for number, job in left.items()
     }
-    for future in as_completed(list(futures)):
+    for future in _distributed().as_completed(list(futures)):
         if future.status == "cancelled":
             raise ConnectionError("the scheduler forgot the job")
         error = future.exception() if future.status == "error" else None
@@ -69,34 +70,12 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@contextmanager
-def _cluster(address: str) -> Iterator[str]:
-    """The address of a scheduler: the one given, or of workers on this machine's cores."""
-    if address:
-        yield address
-    else:
-        with local_cluster(cores()) as local:
-            yield local.scheduler_address
-
-
 def local_cluster(count: int) -> Any:
     """Dask workers on this machine, processes of one thread each; a context manager."""
+    quiet = {"dashboard_address": ":0", "silence_logs": logging.ERROR}
     return _distributed().LocalCluster(
-        n_workers=count,
-        threads_per_worker=1,
-        dashboard_address=":0",
-        memory_limit=0,
-        silence_logs=logging.ERROR,
+        n_workers=count, threads_per_worker=1, memory_limit=0, **quiet
     )
-
-
-def _connection_errors() -> tuple[type[BaseException], ...]:
-    from concurrent.futures import CancelledError
-
-    from distributed.client import FutureCancelledError
-    from distributed.comm.core import CommClosedError
-
-    return (OSError, TimeoutError, CancelledError, FutureCancelledError, CommClosedError)
 
 
 def _distributed() -> Any:

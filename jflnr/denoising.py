@@ -191,10 +191,10 @@ class Denoiser:
             return {name: np.concatenate([parts[name] for parts in found]) for name in found[0]}
         if self.backend == "jax":
             return on_frame(method, inputs, names)
-        from jflnr.opencl.twins import filters_on
+        from jflnr.opencl import twins
 
-        images = method.images(inputs, names, filters=filters_on(self.context))
-        return self._on_device(method)(images, out)
+        images = method.images(inputs, names, filters=twins.filters_on(self.context))
+        return twins.regress(method, images, self.context, out=out)
 
     def next(self, frame: Frame, out: np.ndarray | None = None) -> Any:
         """Denoise the next frame of a shot, with what those before it left (docs/temporal.md).
@@ -216,11 +216,6 @@ class Denoiser:
             return self._device
         return default_context() if self._device is None else Context(self._device)
 
-    def _on_device(self, method: Any) -> Callable[..., Parts]:
-        from jflnr.opencl import twins
-
-        return lambda images, out=None: twins.regress(method, images, self.context, out=out)
-
     def strips(
         self, rows: Rows, names: tuple[str, ...], tile: int, folder: Path | None = None
     ) -> Iterator[tuple[int, Parts]]:
@@ -238,7 +233,10 @@ class Denoiser:
         if self.backend == "jax":
             parts = tiled.strips(rows, method, names, tile, folder)
         else:
-            parts = tiled.overlapping(rows, method, names, tile, self._on_device(method))
+            from jflnr.opencl import twins
+
+            whole = lambda images: twins.regress(method, images, self.context)
+            parts = tiled.overlapping(rows, method, names, tile, whole)
         while True:
             with _own_settings(self.backend):  # which are the caller's own in between
                 found = next(parts, None)
@@ -255,27 +253,23 @@ class Denoiser:
 
     def _over_time(self, frame: Frame) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """`start` and `step`, the method's own if it has them."""
-        method, name = self.method_for(frame), "jflnr.temporal"
-        own = hasattr(method, "step")
-        if self.backend == "jax" and own:
+        method, partial = self.method_for(frame), functools.partial
+        options = {"context": self.context} if self.backend == "opencl" else {}
+        if not hasattr(method, "step"):
+            home = importlib.import_module("jflnr.opencl.temporal" if options else "jflnr.temporal")
+            options |= {"method": method, "guides": self.guides}
+            return partial(home.start, **options), partial(home.step, **options)
+        if not options:
             return method.start, method.step
-        options: dict[str, Any] = {}
-        if self.backend == "opencl":
-            options["context"] = self.context
-            name = f"jflnr.opencl.{method.name if own else 'temporal'}"
-        home, taken = importlib.import_module(name), {} if own else {"guides": self.guides}
-        step = functools.partial(home.step, method=method, **taken, **options)
-        taken |= {} if own else {"method": method}
-        return functools.partial(home.start, **taken, **options), step
+        home = importlib.import_module(f"jflnr.opencl.{method.name}")
+        return partial(home.start, **options), partial(home.step, method=method, **options)
 
 
 def _given(parts: Parts, frame: Frame, out: np.ndarray | None) -> Array | tuple[Array, ...]:
     """What the caller gets, as arrays of the frame's kind."""
     arrays = [parts["image"], *(array for name, array in parts.items() if name != "image")]
-    if isinstance(frame.indirect, np.ndarray):
-        arrays = [np.asarray(array) for array in arrays]
-    else:
-        arrays = [jax.numpy.asarray(array) for array in arrays]
+    kind = np if isinstance(frame.indirect, np.ndarray) else jax.numpy
+    arrays = [kind.asarray(array) for array in arrays]
     if out is not None:
         if arrays[0] is not out:
             np.copyto(out, arrays[0], casting="same_kind")

@@ -8,7 +8,6 @@ Whatever is wrong with a file is raised as OSError or ValueError, in one sentenc
 
 import contextlib
 import errno
-import functools
 import io
 import itertools
 import os
@@ -83,8 +82,8 @@ def read_attributes(path: PathLike) -> Attributes:
         channels = read_channels(path)
         size = next(iter(channels.values())).shape
         return Attributes("", "NO", 1, Window(), {}, size, tuple(channels))
-    with _opened(Path(path)) as (parts, _):
-        header = parts[0].header
+    parts = _parts(Path(path), header_only=True)
+    header = parts[0].header
     (x0, y0), (x1, y1) = header["dataWindow"]
     low, high = header["displayWindow"]
     comments = header.get("comments")
@@ -108,10 +107,7 @@ def read_channels(path: PathLike) -> dict[str, np.ndarray]:
     if pfm.named(path):
         _check_there(path)
         return pfm.read(path)
-    with _opened(path) as (announced, read):
-        parts = read()
-        if len(parts) != len(announced):
-            raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
+    parts = _parts(path, header_only=False)
     channels = _named(parts)
     check_sizes(path, channels)
     if len({tuple(map(int, part.header["dataWindow"][0])) for part in parts}) > 1:
@@ -201,10 +197,11 @@ def _header(
     """The header of an image of height and width `size`, but for its compression."""
     (x, y), display = window or Window()
     corners = (x, y, x + size[1] - 1, y + size[0] - 1)
+    box = lambda ends: (np.array(ends[:2], np.int32), np.array(ends[2:], np.int32))
     header = dict(others or {}) | {
         "type": OpenEXR.scanlineimage,
-        "dataWindow": _box(corners),
-        "displayWindow": _box(display or corners),
+        "dataWindow": box(corners),
+        "displayWindow": box(display or corners),
     }
     return header if comments is None else header | {"comments": comments}
 
@@ -250,25 +247,20 @@ def _named(parts: list[_Part]) -> dict[str, np.ndarray]:
     return channels
 
 
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[tuple[list[_Part], Callable[[], list[_Part]]]]:
-    """The headers of all parts, and a function for the parts that OpenEXR can read with pixels.
+def _parts(path: Path, header_only: bool) -> list[_Part]:
+    """All parts, whose headers are checked before pixels are read.
 
-    It takes no texts or names that are not UTF-8. In the copy that it then gets, letters beyond
-    ASCII are tildes, which sort where they do; the texts are put back, taken as Latin-1.
+    OpenEXR takes no texts or names that are not UTF-8. In the copy that it then gets, letters
+    beyond ASCII are tildes, which sort where they do; the texts are put back, taken as Latin-1.
     """
     _check_file(path)
     texts: dict[str, str] = {}
-    data, place, parts = b"", path, None
+    data, place, announced = b"", path, None
     with _silence(), tempfile.TemporaryDirectory() as folder:
-
-        def read(header_only: bool) -> list[_Part]:
-            return _parts(place, header_only, lambda text: texts.get(text, text))
-
         try:
-            while parts is None:
+            while announced is None:
                 try:
-                    parts = read(header_only=True)
+                    announced = _read(place, texts, header_only=True)
                 except UnicodeDecodeError as error:
                     data, text = data or path.read_bytes(), error.object
                     plain = bytes(byte if byte < 128 else ord("~") for byte in text)
@@ -281,29 +273,30 @@ def _opened(path: Path) -> Iterator[tuple[list[_Part], Callable[[], list[_Part]]
                         raise
                     place = Path(folder) / "copy.exr"
                     place.write_bytes(data)
-            for part in parts:
+            for part in announced:
                 _check_header(path, part)
-            yield parts, functools.partial(read, header_only=False)
+            parts = announced if header_only else _read(place, texts, header_only=False)
+            if len(parts) != len(announced):
+                raise ValueError(f"{path} is truncated or damaged: its pixels cannot be read")
+            return parts
         except Exception as error:  # RuntimeError, TypeError, MemoryError, ...
             if str(error).startswith(str(path)):
                 raise  # a sentence of ours
             raise ValueError(_why_unreadable(path)) from error
 
 
-def _parts(path: Path, header_only: bool, named: Callable[[str], str]) -> list[_Part]:
-    """named: what a text or a name of the file stands for."""
+def _read(path: Path, texts: Mapping[str, str], header_only: bool) -> list[_Part]:
+    """texts: what some texts and names of the file stand for."""
+    named = lambda text: texts.get(text, text)
     file = OpenEXR.File(os.fsencode(path), separate_channels=True, header_only=header_only)
-    return [
-        _Part(
-            part.name(),
-            {named(n): named(v) if isinstance(v, str) else v for n, v in header.items()},
-            {
-                named(channel.name): channel.pixels
-                for channel in (header["channels"] if header_only else part.channels.values())
-            },
-        )
-        for part, header in zip(file.parts, map(file.header, range(len(file.parts))), strict=True)
-    ]
+    parts = []
+    for i, part in enumerate(file.parts):
+        header = file.header(i)
+        stored = header["channels"] if header_only else part.channels.values()
+        header = {named(n): named(v) if isinstance(v, str) else v for n, v in header.items()}
+        channels = {named(channel.name): channel.pixels for channel in stored}
+        parts.append(_Part(part.name(), header, channels))
+    return parts
 
 
 def latin_1(name: str) -> str:
@@ -373,10 +366,6 @@ def check_sizes(path: Path, channels: Mapping[str, np.ndarray]) -> None:
         raise ValueError(f"{path}: sizes disagree (width x height): {listed}")
 
 
-def _box(corners: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(corners[:2], np.int32), np.array(corners[2:], np.int32)
-
-
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
     """Keep OpenEXR's own remarks off the terminal: it prints to stdout and, from C, to stderr.
@@ -385,7 +374,7 @@ def _silence() -> Iterator[None]:
     """
     with _lock:
         if not _silent:
-            _hushed.append(_hush())
+            _hush()
         _silent.append(None)
     try:
         yield
@@ -393,22 +382,18 @@ def _silence() -> Iterator[None]:
         with _lock:
             _silent.pop()
             if not _silent:
-                _hushed.pop().close()
+                _opening.close()
 
 
 _lock = threading.Lock()
 _silent: list[None] = []  # one entry for each thread that wants silence
-_hushed: list[contextlib.ExitStack] = []
+_opening = contextlib.ExitStack()  # what opens both again
 
 
-def _hush() -> contextlib.ExitStack:
-    """Close both; what opens them again."""
-    stack = contextlib.ExitStack()
+def _hush() -> None:
     saved = os.dup(2)
-    stack.callback(os.close, saved)
-    stack.callback(os.dup2, saved, 2)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    os.close(nowhere)
-    stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
-    return stack
+    _opening.callback(os.close, saved)
+    _opening.callback(os.dup2, saved, 2)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    _opening.enter_context(contextlib.redirect_stdout(io.StringIO()))

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import jaxopt
 import numpy as np
-from jaxopt.tree_util import tree_l2_norm
+from scipy.optimize import minimize
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
@@ -82,46 +81,38 @@ def fit(
     if any(frame.reference is None for frame in frames):
         raise ValueError("frames: every frame needs a reference to be fitted to")
     names = choose(frames[0], guides)
-    prepare, one = (
-        (_plain, _value_and_grad)
-        if isinstance(method, FLR)
-        else (_adaptive, _adaptive_value_and_grad)
-    )
+    prepare = _adaptive
     if isinstance(method, FLR):
-        method = dataclasses.replace(method, support=SUPPORT)
+        prepare, method = _plain, dataclasses.replace(method, support=SUPPORT)
     examples = [prepare(method, frame, choose(frame, names)) for frame in frames]
     values: list[float] = []
 
-    def mean_loss(logarithms: Any) -> tuple[jax.Array, Any]:
+    def mean_loss(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
         # One frame at a time: memory for one, and one program for all frames of a size.
-        losses = [one(method, logarithms, example) for example in examples]
-        mean = jax.tree.map(lambda *some: sum(some) / len(some), *losses)
-        values.append(float(mean[0]))
-        return mean
+        losses = [_value_and_grad(method, jnp.float32(logarithms), example) for example in examples]
+        value, slope = (sum(some) / len(some) for some in zip(*losses, strict=True))
+        values.append(float(value))
+        return values[-1], np.asarray(slope, np.float64)
 
     done = itertools.count(1)
-    # SciPy's search along lines never ends above its start, as `jaxopt.LBFGS` did here.
-    solver = jaxopt.ScipyMinimize(
-        fun=mean_loss,
-        value_and_grad=True,
-        jit=False,
-        method="L-BFGS-B",
-        maxiter=steps,
-        callback=lambda _: progress(next(done), min(values)) if progress else None,
-    )
     # Every real value of a logarithm is a valid model.
-    start = [jnp.log(jnp.float32(number)) for number in jax.tree.leaves(method)]
-    logarithms, info = solver.run(start)
-    fitted = jax.tree.map(float, _with(method, logarithms))
+    found = minimize(
+        mean_loss,
+        np.float64(jnp.log(jnp.float32(jax.tree.leaves(method)))),
+        jac=True,
+        method="L-BFGS-B",
+        callback=lambda _: progress(next(done), min(values)) if progress else None,
+        options={"maxiter": steps},
+    )
+    fitted = jax.tree.map(float, _with(method, jnp.float32(found.x)))
     if isinstance(fitted, FLR):
         fitted = dataclasses.replace(fitted, support=None)
-    return Fit(fitted, values[0], float(info.fun_val), int(info.iter_num))
+    return Fit(fitted, values[0], float(found.fun), int(found.nit))
 
 
-def _with(method: Any, logarithms: Sequence[jax.Array]) -> Any:
-    """The method with the numbers of these logarithms."""
-    numbers = [jnp.exp(number) for number in logarithms]
-    return jax.tree.unflatten(jax.tree.structure(method), numbers)
+def _with(method: Any, logarithms: jax.Array) -> Any:
+    """The method with the numbers of these logarithms, `(n,)`."""
+    return jax.tree.unflatten(jax.tree.structure(method), list(jnp.exp(logarithms)))
 
 
 def _plain(method: FLR, frame: Frame, names: tuple[str, ...]) -> Example:
@@ -140,13 +131,10 @@ def smape(picture: jax.Array, reference: jax.Array) -> jax.Array:
     return jnp.mean(jnp.abs(picture - reference) / (jnp.abs(picture) + reference + epsilon))
 
 
-def _loss(method: FLR, logarithms: Sequence[jax.Array], example: Example) -> jax.Array:
+def _loss(method: FLR, logarithms: jax.Array, example: Example) -> jax.Array:
     method = _with(method, logarithms)
     parts, _ = run(method.stages()[1:], method, example.parts, example.known)
     return smape(example.albedo * parts["image"], example.target)
-
-
-_value_and_grad = jax.jit(jax.value_and_grad(_loss, argnums=1))
 
 
 def _adaptive(method: Any, frame: Frame, names: tuple[str, ...]) -> Example:
@@ -160,15 +148,16 @@ def _adaptive(method: Any, frame: Frame, names: tuple[str, ...]) -> Example:
     return Example(images, {}, shown, np.clip(shown * cut(reference), 0, BRIGHTEST))
 
 
-def _adaptive_loss(method: Any, logarithms: Sequence[jax.Array], example: Example) -> jax.Array:
+def _adaptive_loss(method: Any, logarithms: jax.Array, example: Example) -> jax.Array:
     light = regress(_with(method, logarithms), example.parts)["image"]
     return shown_error(light * example.albedo, jnp.asarray(example.target))
 
 
 @jax.jit
-def _adaptive_value_and_grad(
-    method: Any, logarithms: Sequence[jax.Array], example: Example
-) -> tuple[jax.Array, Any]:
+def _value_and_grad(
+    method: Any, logarithms: jax.Array, example: Example
+) -> tuple[jax.Array, jax.Array]:
+    if isinstance(method, FLR):
+        return jax.value_and_grad(_loss, argnums=1)(method, logarithms, example)
     value, slope = jax.value_and_grad(_adaptive_loss, argnums=1)(method, logarithms, example)
-    factor = jnp.minimum(1, LONGEST / jnp.maximum(tree_l2_norm(slope), 1e-12))
-    return value, jax.tree.map(lambda component: factor * component, slope)
+    return value, slope * jnp.minimum(1, LONGEST / jnp.maximum(jnp.linalg.norm(slope), 1e-12))

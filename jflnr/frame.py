@@ -57,8 +57,7 @@ class Frame:
 
     def layers(self) -> dict[str, Array]:
         """Those that there are, by name."""
-        names = (each.name for each in dataclasses.fields(self))
-        return {name: layer for name in names if (layer := getattr(self, name)) is not None}
+        return {name: layer for name, layer in vars(self).items() if layer is not None}
 
     def map(self, change: Callable[[Array], Array]) -> Frame:
         """The frame with every layer changed."""

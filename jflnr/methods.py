@@ -59,9 +59,7 @@ def method_of(method: Any = DEFAULT, **options: Any) -> Any:
     if not hasattr(method, "for_frame") or isinstance(method, type):
         raise TypeError(f"method must be a name or an object such as FLR(); got {method!r}")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
-    for option in options:
-        if option not in fields:
-            raise TypeError(
-                f"method {method.name} has no {option}; it has {', '.join(fields) or 'no options'}"
-            )
+    if unknown := [option for option in options if option not in fields]:
+        listed = ", ".join(fields) or "no options"
+        raise TypeError(f"method {method.name} has no {unknown[0]}; it has {listed}")
     return dataclasses.replace(method, **options)

@@ -63,12 +63,9 @@ def measure(frame: Frame, indirect: Array) -> dict[str, float | None]:
     if frame.beauty is not None:
         return compare(indirect, frame.reference)
     x, y = reflected(frame, indirect), reflected(frame, frame.reference)
-    result = compare(x, y)
-    result["mse_unbiased"] = None
-    if frame.reference_a is not None:
-        half = reflected(frame, frame.reference_a)
-        result["mse_unbiased"] = unbiased_mse(x, half, 2 * y - half)
-    return result
+    half = None if frame.reference_a is None else reflected(frame, frame.reference_a)
+    unbiased = None if half is None else unbiased_mse(x, half, 2 * y - half)
+    return compare(x, y) | {"mse_unbiased": unbiased}
 
 
 def compare(picture: Array, reference: Array) -> dict[str, float | None]:

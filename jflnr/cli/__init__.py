@@ -1,8 +1,8 @@
 """The command `jflnr`: one file per subcommand.
 
 Exit codes: 0 done, 2 something is wrong with what was asked or given, 3 some frames failed, 130
-interrupted. Modules here import numerical code inside the functions that run it, so that `--help`
-and `info` answer at once.
+interrupted. Modules here import JAX, and what imports it, inside the functions that run it, so that
+`--help` and `info` answer at once.
 """
 
 import argparse
@@ -22,17 +22,8 @@ EXAMPLES = """\
   jflnr denoise render.exr -o out/ --png      the clean picture, and a preview to look at
 """
 
-COMMANDS = {
-    "denoise": denoise,
-    "info": info,
-    "metrics": metrics,
-    "report": report,
-    "view": view,
-    "fit": fit,
-    "train": train,
-    "doctor": doctor,
-    "completion": completion,
-}
+MODULES = (denoise, info, metrics, report, view, fit, train, doctor, completion)
+COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,8 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     arguments = parser().parse_args(argv)
     try:
-        with _silence() if getattr(arguments, "quiet", False) else contextlib.nullcontext():
-            code = arguments.run(arguments)
+        with open(os.devnull, "w") as nowhere:
+            quiet = getattr(arguments, "quiet", False)
+            with contextlib.redirect_stdout(nowhere if quiet else sys.stdout):
+                code = arguments.run(arguments)
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -67,12 +60,6 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
-        yield
-
-
 class _Parser(argparse.ArgumentParser):
     """An ArgumentParser that answers a wrong command line with one sentence."""
 
@@ -91,14 +78,12 @@ def parser() -> argparse.ArgumentParser:
     whole.add_argument("--version", action="version", version=__version__)
     commands = whole.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, module in COMMANDS.items():
-        summary = (module.__doc__ or "").partition("\n")[0].partition(": ")[2]
+        description = (module.__doc__ or "").partition(": ")[2]
         command = commands.add_parser(
             name,
-            help=summary,
-            description=(module.__doc__ or "").partition(": ")[2],
-            epilog=f"examples:\n{examples}"
-            if (examples := getattr(module, "EXAMPLES", ""))
-            else None,
+            help=description.partition("\n")[0],
+            description=description,
+            epilog=f"examples:\n{module.EXAMPLES}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )

@@ -7,9 +7,11 @@ import math
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
+
+from jflnr.metrics import LABELS
 
 # What the library raises for wrong input. Anything else is a defect and keeps its traceback.
 INPUT_ERRORS = (OSError, ValueError, TypeError, ImportError, MemoryError)
@@ -31,6 +33,13 @@ def sentence(error: BaseException) -> str:
 def printable(text: object) -> str:
     """`text` in one line, with what a terminal would obey in names of files and layers escaped."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in str(text))
+
+
+def refuse(arguments: argparse.Namespace, options: Iterable[str], why: str) -> None:
+    """Raise ValueError, `why` behind the option, if one of the options is given."""
+    for option in options:
+        if (value := getattr(arguments, option)) is not None and value is not False:
+            raise ValueError(f"--{option.replace('_', '-')} {why}")
 
 
 def kept_as_it_is(*paths: str | Path) -> str:
@@ -108,8 +117,6 @@ def table(rows: Sequence[Sequence[str]], left: int = 1) -> str:
 
 def metrics_table(measured: Mapping[str, Mapping[str, float | None]]) -> str:
     """One row of metrics per image, `-` for one that could not be taken."""
-    from jflnr.metrics import LABELS
-
     names = list(next(iter(measured.values())))
     rows = [["", *(LABELS[name] for name in names)]]
     for image, values in measured.items():

@@ -7,12 +7,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from jflnr.denoising import Denoiser
 from jflnr.files import json_object, write_atomically
-
-if TYPE_CHECKING:
-    import jflnr
 
 # Seconds that it may take without a word.
 SILENCE = 1.0
@@ -22,7 +20,7 @@ DONE = "/jax/core/compile/backend_compile_duration"
 
 
 @contextlib.contextmanager
-def compiling_is_told(denoiser: "jflnr.Denoiser", method: str, quiet: bool) -> Iterator[None]:
+def compiling_is_told(denoiser: Denoiser, method: str, quiet: bool) -> Iterator[None]:
     """Say on stderr what takes so long, if that is to compile, and how long it took before."""
     from tqdm import tqdm
 

@@ -4,24 +4,18 @@ import argparse
 import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jflnr import layouts
+from jflnr.denoising import Denoiser
+from jflnr.frame import Frame, composite, not_finite
+from jflnr.images.inputs import guides_of
 from jflnr.methods import PICTURES
-
-if TYPE_CHECKING:
-    from jflnr.denoising import Denoiser
-    from jflnr.frame import Frame
 
 # So much of its light a picture may lose or gain without a word.
 LOST = 0.02
-
-
-def spp_of(source: layouts.Source, arguments: argparse.Namespace) -> int | None:
-    """The samples per pixel of a file of ours."""
-    return arguments.spp if layouts.native.spp_present(source.channels) else None
 
 
 class Result(NamedTuple):
@@ -40,10 +34,8 @@ class Result(NamedTuple):
     passes: np.ndarray | None = None
 
 
-def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
+def result_of(frame: Frame, method: Any, given: Mapping[str, Any]) -> Result:
     """The picture with denoised light in it. given: by name, what the method's last stage gave."""
-    from jflnr.frame import composite
-
     image = np.asarray(given["image"], np.float32)
     if method.name in PICTURES:
         shining = 0 if frame.emitted is None else frame.emitted
@@ -61,7 +53,7 @@ def result_of(frame: "Frame", method: Any, given: Mapping[str, Any]) -> Result:
 
 
 def channels_of(
-    source: layouts.Source, frame: "Frame", result: Result, arguments: argparse.Namespace
+    source: layouts.Source, frame: Frame, result: Result, arguments: argparse.Namespace
 ) -> dict[str, np.ndarray]:
     """What to write."""
     mask = None if frame.mask is None else np.asarray(frame.mask)
@@ -70,16 +62,16 @@ def channels_of(
     return channels if result.error is None else channels | {"error.Y": result.error[..., 0]}
 
 
-def about_of(frame: "Frame", denoiser: "Denoiser", spp: int | None) -> dict[str, Any]:
-    """What was done, for the record and for the header of the output."""
-    from jflnr.images.inputs import guides_of
-
+def about_of(
+    frame: Frame, denoiser: Denoiser, source: layouts.Source, arguments: argparse.Namespace
+) -> dict[str, Any]:
+    """What was done, for the record and for the header of the output; `spp` of a file of ours."""
     method = denoiser.method_for(frame)
     names = ("sigma", "eps", "eps_prime") if method.name == "flr" else ()
     return {
         "method": method.name,
         "backend": denoiser.backend,
-        "spp": spp,
+        "spp": arguments.spp if layouts.native.spp_present(source.channels) else None,
         "guides": guides_of(frame, denoiser.guides, method),
         **({"block": method.block} if hasattr(method, "block") else {}),
         **{name: float(getattr(method, name)) for name in names},
@@ -95,13 +87,10 @@ class Pixels:
     why: str = ""
     light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(2))
 
-    def add(self, frame: "Frame", method: Any, picture: np.ndarray) -> None:
-        from jflnr.frame import not_finite
-
+    def add(self, frame: Frame, method: Any, picture: np.ndarray) -> None:
         whole = method.name in PICTURES
         names = method.features if whole else layouts.LAYERS
-        counts = not_finite(frame)
-        self.not_finite.update({name: n for name, n in counts.items() if name in names})
+        self.not_finite.update({n: c for n, c in not_finite(frame).items() if n in names})
         count, why = layouts.denoised(vars(frame), whole)
         self.denoised, self.why = self.denoised + count, self.why or why
         if whole:

@@ -17,8 +17,10 @@ what the ones before it left.
 import argparse
 import dataclasses
 import errno
+import functools
 import math
 import os
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -26,14 +28,14 @@ from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
-from jflnr import layouts
+from jflnr import cluster, layouts
 from jflnr.cli import shots, streams
-from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, to_json, voices
+from jflnr.cli.common import COLOUR, SOME_FAILED, add_map, guide_names, tinted, to_json, voices
 from jflnr.cli.frames import Record, Worker, failure
-from jflnr.cli.jobs import Job, borrowed, check_apart, plan
-from jflnr.cli.pipeline import pipelined
+from jflnr.cli.jobs import Job, borrowed, check_apart, pipelined, plan
 from jflnr.cli.settings import settings_of
-from jflnr.cli.summary import failed, remarks, repeated, summary, throughput
+from jflnr.cli.summary import remarks, repeated, summary, throughput
+from jflnr.large import memory
 from jflnr.methods import AUTO, BACKENDS, DEFAULT, HOMES, WHOLE
 
 EXAMPLES = """\
@@ -52,6 +54,7 @@ WITHOUT_WAITING = getattr(os, "O_NONBLOCK", 0)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
+    flag = functools.partial(add, action="store_true")
     add("inputs", metavar="IN", nargs="*", type=Path, help="EXR frames, or folders of them, or -")
     for option, layer in {"hdr": "picture", **streams.OF_OIDN}.items():
         add(f"--{option}", metavar="FILE", type=Path, help=f"the {layer}, PFM or EXR, as of OIDN")
@@ -61,66 +64,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     listed = ", ".join(HOMES)
     usual = f"{WHOLE} for other programs' files, {DEFAULT} for our own"
     add("--method", choices=HOMES, metavar="M", help=f"{listed} ({usual})")
-    add(
-        "--explain",
-        action="store_true",
-        help="with --method auto: print how much it refines, and write a map, OUT.plan.png",
-    )
+    plan_of = "with --method auto: print how much it refines, and write a map, OUT.plan.png"
+    flag("--explain", help=plan_of)
     add("--worth", type=float, help="with auto: least share of signal to refine a tile for (0.6)")
-    add(
-        "--backend",
-        default=AUTO,
-        choices=(AUTO, *BACKENDS),
-        help="what runs it; auto takes opencl where it can (auto)",
-    )
+    auto = "what runs it; auto takes opencl where it can (auto)"
+    add("--backend", default=AUTO, choices=(AUTO, *BACKENDS), help=auto)
     add("--guides", type=guide_names, metavar="A,B", help="guides (normal,depth,ao, if present)")
     add("--params", type=Path, metavar="FILE", help="what `jflnr fit` or `train` wrote")
     add("--sigma", type=float, help="standard deviation of the window, pixels")
     add("--eps", type=float, help="multiplicative regularisation")
     add("--eps-prime", type=float, help="additive regularisation")
     add("--block", type=int, help="side of the squares of pixels that share one model")
-    add(
-        "--error-map",
-        action="store_true",
-        help="with flr-adaptive, picture and flnr...: add the standard error as the layer `error`",
-    )
-    add("--lobes", action="store_true", help="with picture: clean every light pass too")
-    add("--temporal", action="store_true", help="use the frames before: a folder is a shot")
-    add(
-        "--history",
-        type=Path,
-        metavar="FILE",
-        help="keep there what the next frame needs, for a later run to go on from (--temporal)",
-    )
-    add("--png", action="store_true", help="also write a tone-mapped preview beside the output")
-    add("--jpeg", action="store_true", help="the same in JPEG")
-    add(
-        "--channels",
-        choices=layouts.CHOICES,
-        default="light",
-        help="write the picture only, also the denoised light (default), or all of the input too",
-    )
-    add("--reference", action="store_true", help="print metrics against the layer `reference`")
-    add(
-        "--fail-below", type=decibels, metavar="DB", help="a frame of less PSNR fails (--reference)"
-    )
-    add("--overwrite", action="store_true", help="replace outputs that exist")
-    add("--json", action="store_true", help="print one JSON list instead of lines")
+    told = "with flr-adaptive, picture and flnr...: add the standard error as the layer `error`"
+    flag("--error-map", help=told)
+    flag("--lobes", help="with picture: clean every light pass too")
+    flag("--temporal", help="use the frames before: a folder is a shot")
+    kept = "keep there what the next frame needs, for a later run to go on from (--temporal)"
+    add("--history", type=Path, metavar="FILE", help=kept)
+    flag("--png", help="also write a tone-mapped preview beside the output")
+    flag("--jpeg", help="the same in JPEG")
+    written = "write the picture only, also the denoised light (default), or all of the input too"
+    add("--channels", choices=layouts.CHOICES, default="light", help=written)
+    flag("--reference", help="print metrics against the layer `reference`")
+    least = "a frame of less PSNR fails (--reference)"
+    add("--fail-below", type=decibels, metavar="DB", help=least)
+    flag("--overwrite", help="replace outputs that exist")
+    flag("--json", help="print one JSON list instead of lines")
     add("--log", type=Path, metavar="FILE", help="add what is said to FILE, with the time")
-    add("--profile", action="store_true", help="print the time of every OpenCL kernel")
+    flag("--profile", help="print the time of every OpenCL kernel")
     add("--memory", metavar="SIZE", help="denoise in pieces what takes more, as 4G (half the free)")
-    add(
-        "--cluster",
-        nargs="?",
-        const="",
-        metavar="ADDRESS",
-        help="denoise on a Dask cluster, tcp://HOST:8786; without ADDRESS on this machine's cores",
-    )
-    level = parser.add_mutually_exclusive_group()
-    level.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
-    level.add_argument(
-        "-v", "--verbose", action="store_true", help="say what each file was read as"
-    )
+    where = "denoise on a Dask cluster, tcp://HOST:8786; without ADDRESS on this machine's cores"
+    add("--cluster", nargs="?", const="", metavar="ADDRESS", help=where)
+    level = parser.add_mutually_exclusive_group().add_argument
+    level("-q", "--quiet", action="store_true", help="print nothing but errors")
+    level("-v", "--verbose", action="store_true", help="say what each file was read as")
 
 
 def decibels(text: str) -> float:
@@ -138,8 +115,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool) -> int:
     """named: puts what the user named into a text. piped: whether stdout is for the picture."""
     from tqdm import tqdm
-
-    from jflnr.large import memory
 
     jobs = plan(arguments.inputs, arguments.output)
     outputs = [path for job in jobs for path in job.files]
@@ -178,7 +153,7 @@ def _run(arguments: argparse.Namespace, named: Callable[[str], str], piped: bool
             for line in remarks(record, told):
                 say(line, loud)
             if "error" in record:
-                say(failed(record), err)
+                say(f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}", err)
             else:
                 say(summary(record, arguments.verbose), results)
         for line in repeated(told):
@@ -208,8 +183,6 @@ def _at_once(path: str, flags: int) -> int:
 
 def _records(worker: Worker, jobs: list[Job], arguments: argparse.Namespace) -> Iterator[Record]:
     """What becomes of the frames, in the order in which they are finished."""
-    from jflnr import cluster
-
     if arguments.cluster is not None:
         # Workers on this machine share its memory.
         at_once = 1 if arguments.cluster else cluster.cores()

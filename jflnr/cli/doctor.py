@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from jflnr.cli.common import table, to_json
+from jflnr.denoising import SHIPPED_FRAME, Denoiser
+from jflnr.frame import read_frame
 
 EXAMPLES = """\
   jflnr doctor
@@ -38,10 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from jflnr.opencl.devices import NoDevice
 
-    found, missing = [], [*_lacking()]
+    found = list[dict[str, str]]()
+    missing = [
+        f"{use} needs {module}: pip install '{package}'"
+        for module, (use, package) in OPTIONAL.items()
+        if importlib.util.find_spec(module) is None
+    ]
     try:
-        for device in _devices():
-            found.append(device)
+        found.extend(_devices())
     except NoDevice as error:
         missing.insert(0, str(error))
     there = {each.name: each.version for each in metadata.distributions()}
@@ -70,9 +76,9 @@ def _devices() -> Iterator[dict[str, str]]:
 
     from jflnr.opencl.devices import all_devices, kind
 
-    found = [(f"{d.platform}:{d.id}", d.device_kind, jax.__version__) for d in jax.devices()]
-    for name, what, driver in found:
-        yield {"backend": "jax", "device": name, "kind": what, "driver": driver}
+    for each in jax.devices():
+        name, what = f"{each.platform}:{each.id}", each.device_kind
+        yield {"backend": "jax", "device": name, "kind": what, "driver": jax.__version__}
     for number, device in enumerate(all_devices()):
         label, driver = f"{number}: {device.name.strip()}", device.version.strip()
         yield {"backend": "opencl", "device": label, "kind": kind(device), "driver": driver}
@@ -89,18 +95,8 @@ def _caches() -> Iterator[dict[str, Any]]:
             yield {"programs of": name, "folder": str(folder), "bytes": size}
 
 
-def _lacking() -> Iterator[str]:
-    """A line for each module that is not there, with the command that brings it."""
-    for module, (use, package) in OPTIONAL.items():
-        if importlib.util.find_spec(module) is None:
-            yield f"{use} needs {module}: pip install '{package}'"
-
-
 def _times(backend: str) -> dict[str, Any]:
     """How long one frame takes, and how long the first one did, with all that it loads."""
-    from jflnr.denoising import SHIPPED_FRAME, Denoiser
-    from jflnr.frame import read_frame
-
     frame, times = read_frame(SHIPPED_FRAME), [time.perf_counter()]
     denoiser = Denoiser("flr", backend=backend)
     for _ in range(2):

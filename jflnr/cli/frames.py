@@ -8,28 +8,20 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import jflnr
-from jflnr import layouts
+from jflnr import exr, layouts
 from jflnr.cli.common import INPUT_ERRORS, printable, sentence
 from jflnr.cli.compiling import compiling_is_told
-from jflnr.cli.content import (
-    Pixels,
-    Result,
-    about_of,
-    channels_of,
-    result_of,
-    spp_of,
-    warnings_of,
-)
+from jflnr.cli.content import Pixels, Result, about_of, channels_of, result_of, warnings_of
 from jflnr.cli.jobs import Job, make_folder
+from jflnr.frame import Frame, frame_of
+from jflnr.large import memory
 from jflnr.methods import DEFAULT, PICTURES, WHOLE, method_of
-
-if TYPE_CHECKING:
-    from jflnr.frame import Frame
+from jflnr.metrics import exposure, measure
 
 # Pixels on each side of what needs the same programs as a frame.
 CORNER = 64
@@ -44,7 +36,7 @@ class Loaded(NamedTuple):
 
     job: Job
     source: layouts.Source | None = None
-    frame: "Frame | None" = None
+    frame: Frame | None = None
     tile: int | None = None
 
 
@@ -53,18 +45,32 @@ class Denoised(NamedTuple):
 
     job: Job
     source: layouts.Source
-    frame: "Frame"
+    frame: Frame
     result: Result
     about: dict[str, Any]
     record: Record
 
 
+def stage(work: Callable[..., Any]) -> Callable[..., Any]:
+    """A stage of `Worker`. It returns a record where nothing is left to do, as the frame is there,
+    has failed or is written; later stages pass that on."""
+
+    @functools.wraps(work)
+    def run(worker: "Worker", given: Any, *more: Any) -> Any:
+        if isinstance(given, dict):
+            return given
+        try:
+            with np.errstate(all="ignore"):  # of any numbers in a file; what counts is said
+                return work(worker, given, *more)
+        except INPUT_ERRORS as error:
+            return failure(given if isinstance(given, Job) else given.job, error)
+
+    return run
+
+
 @dataclass
 class Worker:
     """Denoises files. Calling it does all of a frame's stages; threads may share them.
-
-    A stage returns a record where nothing is left to do: the frame is there, has failed or is
-    written; later stages pass that on.
 
     settings: keyword arguments of `jflnr.Denoiser`. arguments: of the command line. memory: bytes
     that frames may take, None for a share of what is free. at_once: how many may be in memory.
@@ -79,14 +85,14 @@ class Worker:
     exr_seconds: dict[str, float] = field(default_factory=lambda: {"read": 0.0, "write": 0.0})
 
     @functools.cached_property
-    def denoiser(self) -> "jflnr.Denoiser":
+    def denoiser(self) -> jflnr.Denoiser:
         """What denoises; made where it is used, since it does not travel to another process."""
         return self._another()
 
-    def _another(self, **options: Any) -> "jflnr.Denoiser":
+    def _another(self, **options: Any) -> jflnr.Denoiser:
         return jflnr.Denoiser(**self.settings | options)
 
-    def denoiser_for(self, frame: "Frame", tile: int | None) -> "jflnr.Denoiser":
+    def denoiser_for(self, frame: Frame, tile: int | None) -> jflnr.Denoiser:
         """The one for a frame, which also cleans light passes if they are asked for."""
         whole = self.denoiser.method_for(frame).name in PICTURES
         if self.arguments.lobes and not whole:
@@ -115,37 +121,9 @@ class Worker:
             return None
         return _record(job) | {"status": "kept", "kept": [str(path) for path in outputs]}
 
+    @stage
     def load(self, job: Job) -> Loaded | Record:
         """As `read`, also of a frame whose output is there."""
-        return self._reported(job, lambda: self._read(job))
-
-    def denoise(
-        self, loaded: Loaded | Record, given: Callable[["Frame"], Given] | None = None
-    ) -> Denoised | Record:
-        """given: what denoises instead of the denoiser; it may be called twice."""
-        if isinstance(loaded, dict):
-            return loaded
-        given = given or functools.partial(self._given, tile=loaded.tile)
-        return self._reported(loaded.job, lambda: self._denoise(loaded, given))
-
-    def write(self, denoised: Denoised | Record) -> Record:
-        if isinstance(denoised, dict):
-            return denoised
-        return self._reported(denoised.job, lambda: self._write(denoised))
-
-    def _reported(self, job: Job, stage: Callable[[], Any]) -> Any:
-        """What the stage returns, or the record of why it failed."""
-        try:
-            with np.errstate(all="ignore"):  # of any numbers in a file; what counts is said
-                return stage()
-        except INPUT_ERRORS as error:
-            return failure(job, error)
-
-    def _read(self, job: Job) -> Loaded:
-        from jflnr import exr
-        from jflnr.frame import frame_of
-        from jflnr.large import memory
-
         start = time.perf_counter()
         attributes, method = exr.read_attributes(job.source), self.settings["method"]
         make_folder(job.target)
@@ -162,11 +140,11 @@ class Worker:
         tile = None if self.settings["backend"] == "opencl" else tile
         return Loaded(job, source, frame_of(source), tile)
 
-    def _denoise(
-        self, loaded: Loaded, denoise_frame: Callable[["Frame"], Given]
+    @stage
+    def denoise(
+        self, loaded: Loaded, instead: Callable[[Frame], Given] | None = None
     ) -> Denoised | Record:
-        from jflnr.metrics import measure
-
+        """instead: what denoises in place of the denoiser; it may be called twice."""
         job, source, frame, tile = loaded
         arguments = self.arguments
         if source is None or frame is None:
@@ -175,6 +153,7 @@ class Worker:
             assert tile is not None
             return _record(job) | denoise_in_strips(job, self._another(tile=tile), arguments, tile)
         denoiser = self.denoiser_for(frame, tile)
+        denoise_frame = instead or functools.partial(_given, denoiser)
         method = denoiser.method_for(frame)
         measured = arguments.reference or arguments.fail_below is not None
         if measured and frame.reference is None:
@@ -194,7 +173,7 @@ class Worker:
             times.append(time.perf_counter())
         if self.compiled is not None:
             self.compiled.add(shapes)
-        about = about_of(frame, denoiser, spp_of(source, arguments))
+        about = about_of(frame, denoiser, source, arguments)
         result = result_of(frame, method, given)
         pixels = Pixels()
         pixels.add(frame, method, result.picture)
@@ -217,35 +196,21 @@ class Worker:
         if arguments.explain:
             from jflnr.cli.pictures import explain
 
-            record["plan"] = explain(
-                job.explanation, frame, self.settings["method"], self.settings["guides"]
-            )
+            record["plan"] = explain(job.explanation, frame, method, denoiser.guides)
         if measured:
-            noisy, clean = frame.indirect, result.light
+            images = {"noisy": frame.indirect, "denoised": result.light}
             if frame.beauty is not None:
-                noisy, clean = frame.beauty, result.picture
-            images = {"noisy": noisy, "denoised": clean}
-            record["metrics"] = {
-                name: measure(frame, np.asarray(image)) for name, image in images.items()
-            }
+                images = {"noisy": frame.beauty, "denoised": result.picture}
+            record["metrics"] = {name: measure(frame, np.asarray(i)) for name, i in images.items()}
             psnr, least = record["metrics"]["denoised"]["psnr"], arguments.fail_below
             if least is not None and not psnr >= least:
                 raise ValueError(f"{job.source}: its PSNR of {psnr:.2f} dB is below {least:g}")
         return Denoised(job, source, frame, result, about, record)
 
-    def _given(self, frame: "Frame", tile: int | None) -> Given:
-        denoiser = self.denoiser_for(frame, tile)
-        given = denoiser(frame)
-        if not isinstance(given, tuple):
-            return {"image": given}
-        names = denoiser.method_for(frame).stages()[-1].names
-        return dict(zip(names, given, strict=True))
-
-    def _write(self, done: Denoised) -> Record:
+    @stage
+    def write(self, done: Denoised) -> Record:
         """Write what is not there: the EXR, with the input's header and window, the preview."""
-        from jflnr import exr
         from jflnr.cli.pictures import write_preview
-        from jflnr.metrics import exposure
 
         start, arguments = time.perf_counter(), self.arguments
         job, source, frame, result, about, record = done
@@ -263,8 +228,16 @@ class Worker:
         return _record(job) | {"status": "written"} | record
 
 
+def _given(denoiser: jflnr.Denoiser, frame: Frame) -> Given:
+    given = denoiser(frame)
+    if not isinstance(given, tuple):
+        return {"image": given}
+    names = denoiser.method_for(frame).stages()[-1].names
+    return dict(zip(names, given, strict=True))
+
+
 def _make_ready(
-    denoiser: "jflnr.Denoiser", frame: "Frame", denoise_frame: Callable[["Frame"], Given]
+    denoiser: jflnr.Denoiser, frame: Frame, denoise_frame: Callable[[Frame], Given]
 ) -> None:
     """Have all programs for frames like this one, so that compiling is told from denoising."""
     if denoiser.backend == "jax":  # whose programs are for one size

@@ -12,6 +12,9 @@ import numpy as np
 
 from jflnr import exr, layouts
 from jflnr.cli.common import add_map, printable, table, to_json
+from jflnr.denoising import backend_for
+from jflnr.frame import Frame
+from jflnr.images.inputs import guides_of
 from jflnr.methods import AUTO, PICTURES, default_of, method_of
 
 EXAMPLES = """\
@@ -60,22 +63,13 @@ def as_text(facts: dict[str, Any]) -> str:
     rows = [["layer", "channels", "type", "min", "max", "not finite"]]
     for layer in facts["layers"]:
         low, high = ("-" if layer[k] is None else f"{layer[k]:.4g}" for k in ("min", "max"))
-        name = layer["layer"] or "(none)"
-        rows.append(
-            [name, layer["channels"], layer["type"], low, high, str(layer["not_finite_pixels"])]
-        )
+        name, odd = layer["layer"] or "(none)", str(layer["not_finite_pixels"])
+        rows.append([name, layer["channels"], layer["type"], low, high, odd])
     parts = f"{facts['parts']} parts" if facts["parts"] > 1 else "1 part"
-    return "\n".join(
-        [
-            printable(facts["file"]),
-            f"{facts['width']} x {facts['height']} pixels from ({x}, {y}), "
-            f"{facts['compression']} compression, {parts}",
-            "",
-            table(rows, left=3),
-            "",
-            *map(printable, _use_text(facts["denoiser"])),
-        ]
-    )
+    size = f"{facts['width']} x {facts['height']} pixels from ({x}, {y})"
+    stored = f"{size}, {facts['compression']} compression, {parts}"
+    used = map(printable, _use_text(facts["denoiser"]))
+    return "\n".join([printable(facts["file"]), stored, "", table(rows, left=3), "", *used])
 
 
 def _layer(name: str, parts: list[str], channels: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -101,10 +95,6 @@ def _use(source: layouts.Source) -> dict[str, Any]:
         images = layouts.assemble(source)
     except ValueError as error:
         return use | {"usable": False, "why": str(error)}
-    from jflnr.denoising import backend_for
-    from jflnr.frame import Frame
-    from jflnr.images.inputs import guides_of
-
     frame = Frame(**images)
     method = default_of(frame)
     whole = method in PICTURES
@@ -133,11 +123,10 @@ def _use_text(use: dict[str, Any]) -> list[str]:
     if not use["usable"]:
         return [f"layout: {use['layout']}; jflnr denoise cannot use it: {use['why']}", *notes]
     light = exr.layer_of(use["channels"][use["light"]][0]) or "plain R, G, B"
-    if whole := use["method"] in PICTURES:
-        noisy = [f"the whole picture, {light}"]
-    else:
-        noisy = [f"indirect_{spp} (--spp {spp})" for spp in use["spp"]] or [light]
-    denoised = "denoised picture" if whole else "denoised indirect"
+    noisy = [f"indirect_{spp} (--spp {spp})" for spp in use["spp"]] or [light]
+    denoised = "denoised indirect"
+    if use["method"] in PICTURES:
+        noisy, denoised = [f"the whole picture, {light}"], "denoised picture"
     return [
         f"layout: {use['layout']}; jflnr denoise would use",
         f"  method       {use['method']}, if no other is named, by {use['backend']}",

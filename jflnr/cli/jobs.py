@@ -1,12 +1,15 @@
-"""Which frames a command line means, and where their results go."""
+"""Which frames a command line means, where their results go, and how they pass."""
 
 import math
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from jflnr.layouts.override import elsewhere
 
@@ -41,12 +44,10 @@ def expand(inputs: Sequence[Path]) -> list[Path]:
     """The EXR files meant: a file stands for itself, a folder for the `*.exr` in it, in order."""
     files: list[Path] = []
     for path in inputs:
-        if not path.is_dir():
-            files.append(path)
-            continue
-        if not (found := frames_in(path)):
+        found = frames_in(path) if path.is_dir() else [path]
+        if not found:
             raise ValueError(f"{path}: there is no EXR file in this folder")
-        files.extend(found)
+        files += found
     return files
 
 
@@ -109,3 +110,30 @@ def _identity(path: Path) -> tuple[int, int] | Path:
         return Path(os.path.realpath(path))  # which takes links that lead nowhere
     status = path.stat()
     return status.st_dev, status.st_ino
+
+
+def pipelined(
+    jobs: Iterable[Any],
+    read: Callable[[Any], Any],
+    work: Callable[[Any], Any],
+    write: Callable[[Any], Any],
+) -> Iterator[Any]:
+    """What `write(work(read(job)))` returns, job by job; meanwhile the next is read and the last
+    written.
+
+    `work` runs here, the others on a thread of their own each; at most three jobs are under way.
+    """
+    waiting, reads, writes = iter(jobs), list[Future](), list[Future]()
+    with ThreadPoolExecutor(1) as reader, ThreadPoolExecutor(1) as writer:
+        coming = lambda: [reader.submit(read, job) for job in islice(waiting, 1)]
+        try:
+            reads = coming()
+            while reads:
+                found, reads = reads[0].result(), coming()
+                done = work(found)
+                yield from (writing.result() for writing in writes)
+                writes = [writer.submit(write, done)]
+            yield from (writing.result() for writing in writes)
+        finally:
+            for future in (*reads, *writes):
+                future.cancel()

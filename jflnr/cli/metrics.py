@@ -17,10 +17,9 @@ import functools
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
-from jflnr import layouts
+from jflnr import exr, layouts, metrics
 from jflnr.cli.common import add_map, metrics_table, to_json
+from jflnr.frame import frame_of
 
 EXAMPLES = """\
   jflnr metrics clean/room.exr room.exr       against the frame's own reference
@@ -46,22 +45,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 def measure_files(a: Path, b: Path, spp: int, layers: Mapping[str, str]) -> dict[str, float | None]:
     """The metrics of file `a` against file `b`, as this module's docstring says."""
-    from jflnr import exr, metrics
-    from jflnr.frame import frame_of
-
     exr.check_aligned(a, b)
     channels_a, source = exr.read_channels(a), layouts.load(b, spp, layers)
     picture = functools.partial(layouts.picture, channels_a, str(a))
     if "reference" in {*exr.layers_of(source.channels), *layers}:
         frame = frame_of(source)
-        light = _light(channels_a, spp, a) if frame.beauty is None else picture()
-        return metrics.measure(frame, light)
+        if frame.beauty is not None:
+            return metrics.measure(frame, picture())
+        light = "indirect" if "indirect.R" in channels_a else f"indirect_{spp}"
+        names = tuple(f"{light}.{c}" for c in "RGB")
+        return metrics.measure(frame, layouts.layer(channels_a, "indirect", names, str(a)))
     if "beauty" in layers:
         names = source.layout.channels["beauty"]
         return metrics.compare(picture(), layouts.layer(source.channels, "beauty", names, str(b)))
     return metrics.compare(picture(), layouts.picture(source.channels, str(b)))
-
-
-def _light(channels: dict[str, np.ndarray], spp: int, path: Path) -> np.ndarray:
-    layer = "indirect" if "indirect.R" in channels else f"indirect_{spp}"
-    return layouts.layer(channels, "indirect", tuple(f"{layer}.{c}" for c in "RGB"), str(path))

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
 from jflnr.files import replacing
+from jflnr.frame import Frame
 from jflnr.metrics import display
-
-if TYPE_CHECKING:
-    from jflnr.frame import Frame
 
 # Of places that are refined, and of the others; also told apart without colour, by brightness.
 REFINED, COARSE = (250, 230, 90), (40, 60, 110)
@@ -22,14 +20,14 @@ def write_preview(path: Path, picture: np.ndarray, scale: float) -> None:
     _save(path, 255 * display(np.nan_to_num(picture), scale))
 
 
-def explain(path: Path, frame: "Frame", method: Any, guides: Sequence[str] | None) -> list[str]:
+def explain(path: Path, frame: Frame, method: Any, guides: Sequence[str] | None) -> list[str]:
     """Where method auto refines a frame, in lines for a person and as a map."""
     refined, said = plan_of(frame, method, guides)
     _save(path, np.where(refined[..., None], REFINED, COARSE))
     return [said, f"map: {path}"]
 
 
-def plan_of(frame: "Frame", method: Any, guides: Sequence[str] | None) -> tuple[np.ndarray, str]:
+def plan_of(frame: Frame, method: Any, guides: Sequence[str] | None) -> tuple[np.ndarray, str]:
     """Where method auto refines a frame, `(H, W)`, and how much of it that is in words."""
     from jflnr.regression.auto import signal_in_tiles
 

@@ -15,6 +15,7 @@ import argparse
 from pathlib import Path
 
 from jflnr.cli.common import add_map, kept_as_it_is, printable
+from jflnr.cli.jobs import borrowed, check_apart, expand, make_folder
 
 EXAMPLES = """\
   jflnr report room.exr out/room.exr -o report.html     a frame and what was denoised from it
@@ -37,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr.cli.jobs import borrowed, check_apart, expand, make_folder
     from jflnr.report.page import write_report
     from jflnr.report.scenes import Scene, collect
     from jflnr.report.shot import Shot, collect_shot
@@ -50,16 +50,14 @@ def run(arguments: argparse.Namespace) -> int:
     if output.exists() and not arguments.overwrite:
         print(kept_as_it_is(output))
         return 0
-    layers, scenes = dict(arguments.map), list[Scene | Shot]()
+    spp, layers, scenes = arguments.spp, dict(arguments.map), list[Scene | Shot]()
     if not arguments.temporal:
-        scenes += collect(paths, arguments.spp, arguments.reference, layers)
+        scenes += collect(paths, spp, arguments.reference, layers)
     elif arguments.reference is None:
-        scenes.append(collect_shot(paths, arguments.spp, layers))
+        scenes.append(collect_shot(paths, spp, layers))
     else:
-        raise ValueError(
-            "--reference is one picture, and a shot has one for each frame: "
-            "--map reference=FOLDER/{stem}.exr"
-        )
+        one = "--reference is one picture, and a shot has one for each frame"
+        raise ValueError(f"{one}: --map reference=FOLDER/{{stem}}.exr")
     make_folder(output)
     title = arguments.title or ", ".join(scene.name for scene in scenes)
     write_report(output, scenes, title)

@@ -3,7 +3,9 @@
 import argparse
 from typing import Any
 
-from jflnr.methods import AUTO
+from jflnr.cli.common import refuse
+from jflnr.methods import AUTO, DEFAULT, PICTURES, method_of
+from jflnr.parameters import METHODS, load_parameters
 
 # Options that are of the default method, if no other is named.
 OF_DEFAULT = ("guides", "params", "sigma", "eps", "eps_prime")
@@ -14,9 +16,9 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
 
     Without a method it is None, and each frame gets its own, unless other options are of one.
     """
-    from jflnr.methods import DEFAULT, PICTURES, method_of
-
-    backend = _backend(arguments)
+    backend = arguments.backend
+    if backend == AUTO and (arguments.history is not None or arguments.profile):
+        backend = "opencl" if arguments.history is None else "jax"  # they leave no choice
     name = arguments.method
     if name is None and any(getattr(arguments, option) is not None for option in OF_DEFAULT):
         name = DEFAULT
@@ -25,11 +27,9 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
         raise ValueError(f"--error-map needs --method {', '.join(told)}")
     if arguments.profile and backend != "opencl":
         raise ValueError("--profile times OpenCL kernels, so it needs --backend opencl")
-    for option in ("explain", "worth"):
-        if getattr(arguments, option) not in (None, False) and name != "auto":
-            raise ValueError(
-                f"--{option} is about where --method auto refines: it needs that method"
-            )
+    if name != "auto":
+        why = "is about where --method auto refines: it needs that method"
+        refuse(arguments, ("explain", "worth"), why)
     given = {n: getattr(arguments, n) for n in ("sigma", "eps", "eps_prime", "block", "worth")}
     options = {n: value for n, value in given.items() if value is not None}
     if name is None:
@@ -50,18 +50,8 @@ def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _backend(arguments: argparse.Namespace) -> str:
-    """What is to run it; options that leave no choice make it for `auto`."""
-    if arguments.backend == AUTO and arguments.history is not None:
-        return "jax"
-    return "opencl" if arguments.backend == AUTO and arguments.profile else arguments.backend
-
-
 def _load(arguments: argparse.Namespace, method: Any) -> tuple[Any, dict[str, Any]]:
     """The method with what `--params` names, and the rest of the file."""
-    from jflnr.methods import method_of
-    from jflnr.parameters import METHODS, load_parameters
-
     if hasattr(method, "params"):
         from jflnr.network import weights
 

@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jflnr import cluster
+from jflnr.cli.common import refuse
 from jflnr.cli.frames import Denoised, Given, Loaded, Record, Worker, failure
-from jflnr.cli.jobs import Job, natural
-from jflnr.cli.pipeline import pipelined
+from jflnr.cli.jobs import Job, natural, pipelined
+from jflnr.frame import Frame
 
 if TYPE_CHECKING:
-    from jflnr.frame import Frame
     from jflnr.history import History
 
 # What a history depends on.
@@ -37,9 +38,8 @@ def wanted(arguments: argparse.Namespace) -> bool:
     """Whether frames are to be denoised as shots. Raises ValueError if something excludes that."""
     if not (arguments.temporal or arguments.history is not None or arguments.method == "bmfr"):
         return False
-    for name in ("error_map", "explain", "profile", "lobes"):
-        if getattr(arguments, name):
-            raise ValueError(f"--{name.replace('_', '-')} is for frames by themselves, not shots")
+    alone = ("error_map", "explain", "profile", "lobes")
+    refuse(arguments, alone, "is for frames by themselves, not shots")
     if arguments.backend == "opencl" and arguments.history is not None:
         raise ValueError("--history keeps what the jax backend remembers: leave out --backend")
     return True
@@ -53,16 +53,11 @@ def records(worker: Worker, jobs: Sequence[Job], arguments: argparse.Namespace) 
             f"--history is of one shot, and the frames are of {len(shots)} folders: "
             "give one folder, or leave --history out"
         )
-    runner = ShotDenoiser(worker, arguments.history)
     if arguments.cluster is None:
-        return itertools.chain.from_iterable(map(runner.records, shots))
-    from jflnr import cluster
-
-    return itertools.chain.from_iterable(cluster.each(arguments.cluster, runner, shots, _failed))
-
-
-def _failed(shot: Sequence[Job], error: BaseException) -> list[Record]:
-    return [failure(job, error) for job in shot]
+        return itertools.chain.from_iterable(_denoised(worker, shot) for shot in shots)
+    whole = lambda shot: list(_denoised(worker, shot))
+    failed = lambda shot, error: [failure(job, error) for job in shot]
+    return itertools.chain.from_iterable(cluster.each(arguments.cluster, whole, shots, failed))
 
 
 def shots_of(jobs: Iterable[Job]) -> list[list[Job]]:
@@ -73,52 +68,42 @@ def shots_of(jobs: Iterable[Job]) -> list[list[Job]]:
     return [sorted(shot, key=lambda job: natural(job.source)) for shot in shots.values()]
 
 
-@dataclass
-class ShotDenoiser:
-    """Denoises shots, one after another. history: the file of `--history`."""
+def _denoised(worker: Worker, shot: Sequence[Job]) -> Iterator[Record]:
+    """What becomes of each frame. Raises ValueError if the history is not that of this shot."""
+    before = _before(worker.arguments)
+    kept = [worker.kept(job) for job in shot]
+    done = 0 if before is None else _frames_in(before, shot)
+    if missing := [job for job, there in zip(shot[:done], kept, strict=False) if not there]:
+        raise ValueError(
+            f"{worker.arguments.history} is past {missing[0].source}, which has to be denoised: "
+            "delete it, and the shot starts from its first frame"
+        )
+    last = max((i + 1 for i, there in enumerate(kept) if not there), default=done)
+    running = _Running(worker, before, {} if before is None else before.about["header"])
+    yield from (record for record in kept[:done] if record)
+    yield from pipelined(shot[done:last], running.read, running.denoise, running.write)
+    yield from (record for record in kept[last:] if record)
 
-    worker: Worker
-    history: Path | None = None
 
-    def __call__(self, shot: Sequence[Job]) -> list[Record]:
-        return list(self.records(shot))
+def _before(arguments: argparse.Namespace) -> History | None:
+    """What an earlier run left in the file of `--history`, if it was like this one."""
+    from jflnr import history
 
-    def records(self, shot: Sequence[Job]) -> Iterator[Record]:
-        """What becomes of each frame. Raises ValueError if the history is not that of this shot."""
-        before = self._before()
-        kept = [self.worker.kept(job) for job in shot]
-        done = 0 if before is None else _frames_in(before, shot)
-        if missing := [job for job, there in zip(shot[:done], kept, strict=False) if not there]:
-            raise ValueError(
-                f"{self.history} is past {missing[0].source}, which has to be denoised: "
-                "delete it, and the shot starts from its first frame"
+    if arguments.history is None or not arguments.history.exists():
+        return None
+    found = history.read(arguments.history)
+    for name, value in _options(arguments).items():
+        if (other := found.about["options"].get(name, "None")) != value:
+            option = f"--{name.replace('_', '-')}"
+            made, now = (
+                f"without {option}" if chosen == "None" else f"with {option} {chosen}"
+                for chosen in (other, value)
             )
-        last = max((i + 1 for i, there in enumerate(kept) if not there), default=done)
-        header = {} if before is None else before.about["header"]
-        running = _Running(self.worker, self.history, before, header)
-        yield from (record for record in kept[:done] if record)
-        yield from pipelined(shot[done:last], running.read, running.denoise, running.write)
-        yield from (record for record in kept[last:] if record)
-
-    def _before(self) -> History | None:
-        """What an earlier run left, if it was like this one."""
-        from jflnr import history
-
-        if self.history is None or not self.history.exists():
-            return None
-        found = history.read(self.history)
-        for name, value in _options(self.worker.arguments).items():
-            if (other := found.about["options"].get(name, "None")) != value:
-                option = f"--{name.replace('_', '-')}"
-                made, now = (
-                    f"without {option}" if chosen == "None" else f"with {option} {chosen}"
-                    for chosen in (other, value)
-                )
-                raise ValueError(
-                    f"{self.history} was made {made}, and this is {now}: delete it, or name "
-                    "another file"
-                )
-        return found
+            raise ValueError(
+                f"{arguments.history} was made {made}, and this is {now}: delete it, or name "
+                "another file"
+            )
+    return found
 
 
 @dataclass
@@ -127,7 +112,6 @@ class _Running:
     frame that was read."""
 
     worker: Worker
-    history: Path | None
     before: History | None
     header: dict[str, Any]
     state: Any = None
@@ -147,21 +131,12 @@ class _Running:
 
     def denoise(self, loaded: Loaded | Record) -> tuple[Denoised | Record, Any]:
         """The denoised frame, and the state after it."""
-        if isinstance(loaded, dict):
-            return loaded, self.state
-        after = self.state
-
-        def given(frame: Frame) -> Given:
-            nonlocal after
-            after, image = self._step(frame)
-            return {"image": image}
-
-        denoised = self.worker.denoise(loaded, given)
+        denoised = self.worker.denoise(loaded, self._next)
         if isinstance(denoised, Denoised):
-            self.state = after
+            self.state = self.worker.denoiser.state
         return denoised, self.state
 
-    def _step(self, frame: Frame) -> tuple[Any, np.ndarray]:
+    def _next(self, frame: Frame) -> Given:
         denoiser = self.worker.denoiser
         denoiser.state = self.state
         if self.state is None and self.before is not None:
@@ -169,8 +144,7 @@ class _Running:
         if frame.motion is None:
             warnings.warn(UNKNOWN_MOTION, stacklevel=1)
             frame = dataclasses.replace(frame, motion=np.zeros((*frame.depth.shape[:2], 2)))
-        image = denoiser.next(frame)
-        return denoiser.state, np.asarray(image, np.float32)
+        return {"image": denoiser.next(frame)}
 
     def write(self, done: tuple[Denoised | Record, Any]) -> Record:
         """Write the frame, unless it is there, then the history, so that it is never ahead."""
@@ -182,14 +156,10 @@ class _Running:
             return denoised
         record = self.worker.kept(denoised.job) or self.worker.write(denoised)
         self.failed = self.failed or "error" in record
-        if self.history is not None and not self.failed:
-            source = denoised.source
-            about = {
-                "options": _options(self.worker.arguments),
-                "last": _identity(source.path),
-                "header": source.header,
-            }
-            history.write(self.history, state, about)
+        arguments, source = self.worker.arguments, denoised.source
+        if arguments.history is not None and not self.failed:
+            about = {"options": _options(arguments), "last": _identity(source.path)}
+            history.write(arguments.history, state, about | {"header": source.header})
         return record
 
 

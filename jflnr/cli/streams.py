@@ -33,10 +33,8 @@ def as_files(
         if inputs or not all(trio):
             raise ValueError("--hdr, --alb and --nrm are given together, in place of IN")
         named = zip(OF_OIDN.values(), trio[1:], strict=True)
-        inputs, layers = (
-            trio[:1],
-            [*layers, *((name, str(path.absolute())) for name, path in named)],
-        )
+        inputs = trio[:1]
+        layers = [*layers, *((name, str(path.absolute())) for name, path in named)]
     if not inputs:
         raise ValueError("IN is missing: EXR frames, folders of them, or - for standard input")
     if STREAM in inputs and len(inputs) > 1:
@@ -50,7 +48,9 @@ def as_files(
         words: dict[Path, str] = {}
         if inputs == [STREAM]:
             inputs = [_received(folder)]
-            layers = [(name, _from_here(value)) for name, value in layers]
+            # Another file is named as seen from the current folder.
+            here = lambda value: os.path.abspath(value) if elsewhere(value, STREAM) else value
+            layers = [(name, here(value)) for name, value in layers]
             words[inputs[0]] = "standard input"
         target = folder / "out" / f"stdout{inputs[0].suffix}" if output == STREAM else output
         if output == STREAM:
@@ -79,8 +79,3 @@ def _received(folder: Path) -> Path:
         if start == exr.MAGIC or pfm.named(path):
             shutil.copyfileobj(sys.stdin.buffer, file)
     return path
-
-
-def _from_here(value: str) -> str:
-    """A value of `--map`, seen from the current folder if it is another file."""
-    return os.path.abspath(value) if elsewhere(value, STREAM) else value

@@ -11,7 +11,8 @@ import numpy as np
 
 import jflnr
 from jflnr import exr, layouts, pfm
-from jflnr.cli.content import Pixels, about_of, channels_of, result_of, spp_of, warnings_of
+from jflnr.cli.common import refuse
+from jflnr.cli.content import Pixels, about_of, channels_of, result_of, warnings_of
 from jflnr.cli.jobs import Job
 from jflnr.frame import frame_of
 from jflnr.images.inputs import names_of, warn_without_ao
@@ -26,7 +27,10 @@ def denoise_in_strips(
     job: Job, denoiser: "jflnr.Denoiser", arguments: argparse.Namespace, tile: int
 ) -> dict[str, Any]:
     """Read, denoise and write a frame piece by piece; the record of it."""
-    _check(arguments)
+    whole_only = ("png", "jpeg", "explain", "reference", "fail_below", "profile", "lobes")
+    refuse(arguments, whole_only, "needs the whole frame in memory: raise --memory")
+    if arguments.channels == "all":
+        raise ValueError("--channels all needs the whole frame in memory: raise --memory")
     if pfm.named(job.source) or pfm.named(job.target):
         raise ValueError("PFM needs the whole frame in memory: raise --memory")
     start = time.perf_counter()
@@ -34,7 +38,7 @@ def denoise_in_strips(
     first = file.part(0, 1, (*layouts.LAYERS, *layouts.PICTURE))
     whole = frame_of(first)  # but for its size
     method = denoiser.method_for(whole)
-    about = about_of(whole, denoiser, spp_of(first, arguments))
+    about = about_of(whole, denoiser, first, arguments)
     comments = json.dumps(first.header | {"denoiser": about})
     size, window = (file.height, file.width), file.attributes.window
     others = file.attributes.others
@@ -68,13 +72,3 @@ def denoise_in_strips(
         "compile_seconds": 0,
         "warnings": warnings_of(caught, pixels),
     }
-
-
-def _check(arguments: argparse.Namespace) -> None:
-    for option in ("png", "jpeg", "explain", "reference", "fail_below", "profile", "lobes"):
-        if (value := getattr(arguments, option)) is not None and value is not False:
-            raise ValueError(
-                f"--{option.replace('_', '-')} needs the whole frame in memory: raise --memory"
-            )
-    if arguments.channels == "all":
-        raise ValueError("--channels all needs the whole frame in memory: raise --memory")

@@ -27,11 +27,6 @@ def _warning(what: str, text: str) -> str:
     return f"jflnr: {warning} {printable(what)}: {printable(text)}"
 
 
-def failed(record: dict[str, Any]) -> str:
-    """Why a frame failed, for stderr."""
-    return f"{tinted('jflnr:', 'red', sys.stderr)} {record['error']}"
-
-
 def throughput(records: list[dict[str, Any]], exr: dict[str, float], seconds: float) -> str:
     """Frames per second, and how long files kept a thread busy. exr: seconds by `read`, `write`."""
     done = sum(record["status"] == "written" for record in records)
@@ -51,13 +46,12 @@ def summary(record: dict[str, Any], verbose: bool) -> str:
     )
     if record["compile_seconds"]:
         text += f" (and {record['compile_seconds']:.1f} s to compile)"
+    lines = record.get("plan", [])
     if verbose:
         guides = ", ".join(record["guides"]) or "none"
-        lines = [f"layout: {record['layout']}", f"backend: {record['backend']}"]
-        lines += [f"guides: {guides}", *record["notes"]]
-        text += "".join(f"\n  {printable(line)}" for line in lines)
-    if "plan" in record:
-        text += "".join(f"\n  {printable(line)}" for line in record["plan"])
+        read = [f"layout: {record['layout']}", f"backend: {record['backend']}", f"guides: {guides}"]
+        lines = [*read, *record["notes"], *lines]
+    text += "".join(f"\n  {printable(line)}" for line in lines)
     if "metrics" in record:
         text += "\n" + metrics_table(record["metrics"])
     if "profile" in record:

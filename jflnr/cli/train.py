@@ -12,13 +12,15 @@ pixels, 60 MB for pictures.
 
 import argparse
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jflnr import checks
 from jflnr.cli.common import kept_as_it_is, printable
 from jflnr.cli.jobs import check_apart, expand, make_folder
 from jflnr.files import replacing
+from jflnr.methods import method_of
 
 if TYPE_CHECKING:
     from jflnr.network.train import Progress, Result, Settings
@@ -57,8 +59,8 @@ def seconds(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from jflnr import checks
-    from jflnr.methods import method_of
+    from tqdm import tqdm
+
     from jflnr.network import examples
     from jflnr.network.train import WIDTHS, Settings, train
 
@@ -77,25 +79,14 @@ def run(arguments: argparse.Namespace) -> int:
         state.unlink(missing_ok=True)
     folder = arguments.cache or output.with_name(output.name + ".frames")
     method = method_of(arguments.method)
-    records = [examples.prepared(path, folder, method) for path in _shown(paths)]
-    settings = Settings(
-        method=method,
-        widths=WIDTHS[arguments.method],
-        seed=arguments.seed,
-        batch=arguments.batch,
-        rate=arguments.rate,
-        every=arguments.every,
-    )
+    print(f"frames: {len(paths)}", flush=True)
+    shown = tqdm(paths, "preparing", leave=False, disable=None)
+    records = [examples.prepared(path, folder, method) for path in shown]
+    given = {name: getattr(arguments, name) for name in ("seed", "batch", "rate", "every")}
+    settings = Settings(method=method, widths=WIDTHS[arguments.method], **given)
     print("compiling, which may take minutes", flush=True)
-    result = train(
-        records,
-        kept,
-        settings,
-        seconds=arguments.time,
-        steps=arguments.steps or float("inf"),
-        state_file=state,
-        report=_report,
-    )
+    most = {"seconds": arguments.time, "steps": arguments.steps or float("inf")}
+    result = train(records, kept, settings, state_file=state, report=_report, **most)
     _write(output, result, settings, paths)
     print(f"best: step {result.best.step}{_decibels(result.best)} -> {printable(output)}")
     if result.stopped:
@@ -104,25 +95,14 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _shown(paths: Sequence[Path]) -> Iterable[Path]:
-    from tqdm import tqdm
-
-    print(f"frames: {len(paths)}", flush=True)
-    return tqdm(paths, "preparing", leave=False, disable=None)
-
-
 def _report(progress: "Progress") -> None:
-    minutes = progress.seconds / 60
-    print(
-        f"step {progress.step}, {minutes:.1f} minutes: loss {progress.loss:.3f}"
-        f"{_decibels(progress)}",
-        flush=True,
-    )
+    step = f"step {progress.step}, {progress.seconds / 60:.1f} minutes: loss {progress.loss:.3f}"
+    print(f"{step}{_decibels(progress)}", flush=True)
 
 
 def _decibels(progress: "Progress") -> str:
-    found = [f"{psnr:.2f} dB at {spp} spp" for spp, psnr in progress.validation.items()]
-    return "".join(f", {text}" for text in found)
+    found = progress.validation.items()
+    return "".join(f", {psnr:.2f} dB at {spp} spp" for spp, psnr in found)
 
 
 def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence[Path]) -> None:
@@ -140,9 +120,9 @@ def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence
         seconds=round(result.best.seconds),
         validation_psnr={spp: round(v, 3) for spp, v in result.best.validation.items()},
     )
+    if result.stopped:  # there is no time for curves
+        return
     try:
-        if result.stopped:  # there is no time for it
-            return
         from matplotlib.figure import Figure
     except ImportError:
         return

@@ -12,7 +12,7 @@ import functools
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +22,9 @@ from jflnr.cli.common import INPUT_ERRORS, add_map, printable, sentence, to_json
 from jflnr.cli.frames import Loaded, Worker
 from jflnr.cli.jobs import Job, frames_in
 from jflnr.cli.settings import settings_of
+from jflnr.frame import Frame, frame_of
+from jflnr.images.guides import choose
 from jflnr.methods import AUTO, BACKENDS, HOMES, default_of, method_of
-
-if TYPE_CHECKING:
-    from jflnr.frame import Frame
 
 EXAMPLES = """\
   jflnr view room.exr
@@ -85,16 +84,14 @@ class Frames:
                 found[path.name] = path, f"{status.st_mtime_ns}.{status.st_size}"
         return found
 
-    def opened(self, name: str) -> tuple[Loaded, "Frame"]:
+    def opened(self, name: str) -> tuple[Loaded, Frame]:
         """The frame of that name as it is now, twice."""
         there = self.listed()
         if name not in there:
             raise FileNotFoundError(f"{self.path}: there is no frame {name}")
         return self.read(*there[name])
 
-    def _read(self, path: Path, stamp: str) -> tuple[Loaded, "Frame"]:
-        from jflnr.frame import frame_of
-
+    def _read(self, path: Path, stamp: str) -> tuple[Loaded, Frame]:
         source = layouts.load(path, self.spp, self.layers)
         frame = frame_of(source)
         return Loaded(Job(path, path), source, frame), frame
@@ -113,7 +110,6 @@ class Frames:
 
     def scene(self, asked: Mapping[str, str]) -> dict[str, Any]:
         """A frame as it comes, for the page."""
-        from jflnr.images.guides import choose
         from jflnr.report.page import scene_data
         from jflnr.report.scenes import of_frame
 

@@ -4,7 +4,6 @@ OpenEXR's own Python module only knows whole files. Files of one part in scan li
 """
 
 import dataclasses
-import functools
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -45,9 +44,7 @@ def _opened(path: Path) -> Any:
     """The open file; OpenImageIO takes no names that are not UTF-8."""
     open_file = _openimageio().ImageInput.open
     with tempfile.TemporaryDirectory() as folder:
-        try:
-            str(path).encode()
-        except UnicodeEncodeError:
+        if not str(path).isprintable():
             link = Path(folder) / "link.exr"
             link.symlink_to(path.resolve())
             path = link
@@ -79,30 +76,25 @@ class Scanlines:
         self.layout = recognise(nothing, spp, names, path)
         if len(nothing) > len(self.channels):
             raise ValueError(f"{path}: --map to another file needs both whole: raise --memory")
+        self.opaque = self._opaque()
+        self.shares: Shares = np.zeros(0), np.zeros(0)  # while they are looked for
+        self.shares = self._shares()
 
-    def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
-        """Rows `start` to `stop` of the channels that make up these layers of a frame."""
-        return self._part(start, stop, layers, self.shares)
-
-    @functools.cached_property
-    def opaque(self) -> bool:
+    def _opaque(self) -> bool:
         """Whether the picture's alpha, if it has one, is 1 everywhere."""
         names = [name for name in self.layout.picture[3:] if name in self.channels]
         starts = range(0, self.height, BATCH) if names else ()
-        stops = (min(start + BATCH, self.height) for start in starts)
-        parts = (self._read(*rows, names) for rows in zip(starts, stops, strict=True))
+        parts = (self._read(top, min(top + BATCH, self.height), names) for top in starts)
         return all(np.all(part[name] == 1) for part in parts for name in names)
 
-    @functools.cached_property
-    def shares(self) -> Shares:
+    def _shares(self) -> Shares:
         """What tells the samples of a picture of Blender, where its header does not."""
-        nothing = np.zeros(0), np.zeros(0)
         if self.layout.program != "Blender" or told_samples(self.layout, self.attributes):
-            return nothing
+            return self.shares
         found = []
         for start in range(0, self.height, BATCH):
             stop = min(start + BATCH + AROUND, self.height)
-            images = layouts.assemble(self._part(start, stop, SHOWING, nothing))
+            images = layouts.assemble(self.part(start, stop, SHOWING))
             normal, albedo, alpha = (images[name] for name in SHOWING)
             found.append(shares_of(normal, albedo, alpha, BATCH))
         turned, others = zip(*found, strict=True)
@@ -118,16 +110,15 @@ class Scanlines:
 
         return Rows(self.height, self.width, read)
 
-    def _part(
-        self, start: int, stop: int, layers: Collection[str], shares: Shares
-    ) -> layouts.Source:
+    def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
+        """Rows `start` to `stop` of the channels that make up these layers of a frame."""
         wanted = {*NEEDED, *layers}
         names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
         names |= set(self.layout.picture[3:])  # alpha, which goes on to the output
         channels = self._read(start, stop, sorted(names & set(self.channels)))
         (x, y), display = self.attributes.window
         attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
-        whole = self.opaque, shares
+        whole = self.opaque, self.shares
         return layouts.Source(self.path, channels, attributes, self.layout, True, *whole)
 
     def _read(self, start: int, stop: int, names: list[str]) -> dict[str, np.ndarray]:

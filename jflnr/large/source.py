@@ -52,6 +52,5 @@ def scene_of(rows: Rows) -> guide_layers.Scene:
     found = [rows.read(row, row + 1) for row in range(0, rows.height, step)]
     sample = jax.tree.map(lambda *lines: np.concatenate(lines)[:, ::step], *found)
     position = rows.read(rows.height // 2, rows.height // 2 + 1).position
-    return guide_layers.scene_from(
-        sample, None if position is None else position[0, rows.width // 2]
-    )
+    middle = None if position is None else position[0, rows.width // 2]
+    return guide_layers.scene_from(sample, middle)

@@ -7,6 +7,7 @@ on with as much around it as the stage says that it looks at, so that the result
 import functools
 import itertools
 import math
+import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -20,12 +21,41 @@ import numpy as np
 from jflnr.frame import Frame
 from jflnr.images.guides import Scene
 from jflnr.large.pieces import Piece, pieces
-from jflnr.large.planes import Planes
 from jflnr.large.source import Rows, scene_of
 from jflnr.stages import Known, Parts, Stage
 
 # The first row of a strip, and what the last stage gives for it: `image` and more, `(h, W, C)`.
 Strip = tuple[int, Parts]
+
+
+class Planes:
+    """Planes `(*lead, *size)` of float32 in a temporary file, as much in memory as is being used.
+
+    `file` is gone once it is closed. There the planes of a row lie together, since rows are what is
+    written and read. side: of the blocks that they are on, in pixels; 0 for pixels.
+    """
+
+    def __init__(
+        self, folder: Path | None, lead: tuple[int, ...], size: tuple[int, int], side: int = 0
+    ) -> None:
+        self.lead, self.side = lead, side
+        self.shape = size[0], math.prod(lead), size[1]
+        self.file = tempfile.TemporaryFile(dir=folder, prefix=".jflnr-")
+        self.file.truncate(4 * math.prod(self.shape))
+
+    def __setitem__(self, area: tuple[slice, slice], planes: np.ndarray) -> None:
+        rows, columns = area
+        flat = planes.reshape(-1, *planes.shape[-2:])
+        self._mapped()[rows, :, columns] = np.moveaxis(flat, 0, 1)
+
+    def __getitem__(self, area: tuple[slice, slice]) -> np.ndarray:
+        rows, columns = area
+        found = np.ascontiguousarray(np.moveaxis(self._mapped()[rows, :, columns], 1, 0))
+        return found.reshape(*self.lead, *found.shape[1:])
+
+    def _mapped(self) -> np.memmap:
+        # Mapped anew each time: what was touched counts as this process's memory until unmapped.
+        return np.memmap(self.file, np.float32, "r+", shape=self.shape)
 
 
 @dataclass

@@ -1,17 +1,16 @@
 """From a file's channels and its layout to the layers of a Frame."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from jflnr.camera import Camera
+from jflnr.camera import Camera, centres
 from jflnr.exr import Window
-from jflnr.layouts.camera import camera_of, depth_of, position_of
 from jflnr.layouts.channels import LAYERS, NATIVE, PICTURE, layer
-from jflnr.layouts.light import DARK, demodulate, rest
+from jflnr.layouts.light import DARK, SKY, demodulate, rest
 from jflnr.layouts.samples import samples_of
 from jflnr.layouts.source import Source
-from jflnr.layouts.surface import SKY
 
 # Arrays, or None for a layer that is absent.
 Layers = dict[str, Any]
@@ -66,13 +65,34 @@ def assemble(source: Source) -> Layers:
     return {name: images[name] for name in (*LAYERS, *PICTURE)}
 
 
+def camera_of(header: Mapping[str, Any]) -> Camera | None:
+    """From our own header's entries or the attribute `worldToCamera`, as pbrt writes it.
+
+    The latter does not say the field of view, which then is None.
+    """
+    try:
+        if "worldToCamera" not in header:
+            return Camera.of(header)
+        to_camera = np.array(header["worldToCamera"], np.float64).reshape(4, 4)
+        return Camera(np.linalg.inv(to_camera), None)
+    except (TypeError, ValueError, OverflowError, np.linalg.LinAlgError):
+        return None
+
+
 def _derived(images: Layers, camera: Camera, window: Window) -> Layers:
-    """Depth or position, if it is absent."""
+    """Depth along the view axis or position in the world, if it is absent; 0 where nothing is."""
     position, depth, normal = images["position"], images["depth"], images["normal"]
     if depth is None and position is not None and normal is not None:
-        return {"depth": depth_of(camera, position, (normal != 0).any(axis=-1, keepdims=True))}
+        along = (position - camera.to_world[:3, 3]) @ camera.to_world[:3, 2]
+        hit = (normal != 0).any(axis=-1, keepdims=True)
+        return {"depth": np.where(hit, along[..., None], 0).astype(np.float32)}
     if position is None and depth is not None and camera.fov_x is not None:
-        return {"position": position_of(camera, depth, window)}
+        height, width = depth.shape[:2]
+        (x0, y0), display = window
+        left, top, right, bottom = display or (x0, y0, x0 + width - 1, y0 + height - 1)
+        pixels = centres(width, height) + np.array([x0 - left, y0 - top])
+        points = camera.points(pixels, depth[..., 0], right - left + 1, bottom - top + 1)
+        return {"position": np.where(depth > 0, points, 0).astype(np.float32)}
     return {}
 
 

@@ -114,7 +114,9 @@ def layer(
         raise ValueError(f"{source}: layer {stem} is missing; {advice or present(channels)}")
     if missing:
         raise ValueError(f"{source}: layer {stem} lacks its channel {', '.join(missing)}")
-    image = _float32(np.stack([channels[channel] for channel in names], axis=-1))
+    image = np.stack([channels[channel] for channel in names], axis=-1)
+    half = image.dtype == np.float16
+    image = HALVES.take(image.view(np.uint16)) if half else image.astype(np.float32)
     if not part and not any(np.isfinite(row).any() for row in image):
         raise ValueError(f"{source}: layer {stem} is NaN or infinite everywhere")
     count = len((LAYERS | PICTURE).get(name, "RGB"))
@@ -125,12 +127,6 @@ def layer(
     if count == 1 < len(names):
         return image.mean(axis=-1, keepdims=True)
     return np.repeat(image, count, axis=-1) if len(names) == 1 < count else image
-
-
-def _float32(image: np.ndarray) -> np.ndarray:
-    if image.dtype != np.float16:
-        return image.astype(np.float32)
-    return np.take(HALVES, image.view(np.uint16))
 
 
 def present(channels: Iterable[str]) -> str:

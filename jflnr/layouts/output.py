@@ -28,10 +28,8 @@ def output_channels(
     picture.
     """
     layout = source.layout
-    channels: dict[str, np.ndarray] = {}
-    if choice == "all":
-        channels |= source.channels
-        channels |= _planes(layout.picture[:3], picture)
+    every = source.channels | _planes(layout.picture[:3], picture)
+    channels = every if choice == "all" else {}
     surface = True if mask is None else mask[..., 0] > 0
     if choice == "all" and layout.picture and light is not None:
         for name, plane in _planes(layout.channels.get("indirect", ()), light).items():

@@ -28,7 +28,16 @@ def find(
     found = {}
     for name, value in layers.items():
         checks.choice("layers", name, (*LAYERS, *filter(PICTURE.get, PICTURE), "radiance"))
-        found[name] = _find(channels, name, value, path)
+        if there := elsewhere(value, path):
+            other, inside = there
+            exr.check_aligned(path, other)
+            read = exr.read_channels(other)
+            chosen = _choose(read, name, inside, str(other))
+            borrowed = {f"{BORROWED}{other}:{channel}": read[channel] for channel in chosen}
+            channels |= borrowed
+            found[name] = tuple(borrowed)
+        else:
+            found[name] = _choose(channels, name, value, str(path))
     exr.check_sizes(path, channels)
     return found
 
@@ -51,19 +60,6 @@ def elsewhere(value: str, path: Path) -> tuple[Path, str] | None:
     if (match := FILE.fullmatch(value)) is None:
         return None
     return path.parent / match["file"].replace("{stem}", path.stem), match["name"] or ""
-
-
-def _find(channels: dict[str, np.ndarray], name: str, value: str, path: Path) -> tuple[str, ...]:
-    """The channels that `value` means; those of another file are added to `channels`."""
-    if there := elsewhere(value, path):
-        other, inside = there
-        exr.check_aligned(path, other)
-        read = exr.read_channels(other)
-        found = _choose(read, name, inside, str(other))
-        borrowed = {f"{BORROWED}{other}:{channel}": read[channel] for channel in found}
-        channels |= borrowed
-        return tuple(borrowed)
-    return _choose(channels, name, value, str(path))
 
 
 def _choose(

@@ -11,16 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 from jflnr.files import write_atomically
 from jflnr.frame import HALF_MAX, Frame
 from jflnr.metrics import LABELS, RELATIVE_EPSILON, display, exposure, flip_map
-from jflnr.report.crops import find_crops
-from jflnr.report.scenes import REFERENCE, Scene
+from jflnr.report.scenes import NOISY, REFERENCE, Scene
 from jflnr.report.shot import Shot, shot_data
 
 SCRIPTS = "data tone viewer panel player keys tables main".split()
 LOWER_IS_BETTER = ("flip", "rmse", "smape", "mse", "mse_unbiased", "ms", "warped")
+# Where to look first: so many squares, of so many pixels on a side.
+COUNT, SIZE = 2, 64
 
 
 def write_report(
@@ -139,13 +141,40 @@ def unit_of(scene: Scene) -> float:
 def _exposures(scene: Scene) -> dict[str, float]:
     """The factor that each view is shown with: the metrics' rule, on what reflects."""
     judge = scene.judge
-    lights = {"reflected": scene.radiance(judge)}
+    lights = {"reflected": scene.known(judge)}
     if scene.frame is not None and not scene.whole:
         direct = 0 if scene.frame.direct is None else np.asarray(scene.frame.direct)
-        lights |= {"picture": scene.radiance(judge + direct), "light": judge}
-    return {
-        name: exposure(np.nan_to_num(light, posinf=0, neginf=0)) for name, light in lights.items()
-    }
+        light = np.nan_to_num(judge, posinf=0, neginf=0)
+        lights |= {"picture": scene.known(judge + direct), "light": light}
+    return {name: exposure(light) for name, light in lights.items()}
+
+
+def find_crops(scene: Scene, size: int = SIZE) -> list[dict[str, int]]:
+    """Squares `{"x", "y", "size"}` inside the picture, far apart, the most different first."""
+    height, width = scene.size
+    size = min(size, height, width)
+    spread = uniform_filter(_spread(scene), size, mode="nearest")
+    half = size // 2
+    # Only centres whose square lies inside.
+    inside = spread[half : height - size + half + 1, half : width - size + half + 1]
+    found = []
+    for _ in range(COUNT):
+        y, x = (int(i) for i in np.unravel_index(np.argmax(inside), inside.shape))
+        if inside[y, x] < 0:
+            break
+        found.append({"x": x, "y": y, "size": size})
+        inside[max(y - size + 1, 0) : y + size, max(x - size + 1, 0) : x + size] = -1
+    return found
+
+
+def _spread(scene: Scene) -> np.ndarray:
+    """How far the errors of the versions lie apart at every pixel, as displayed, (H, W)."""
+    basis = scene.known(scene.judge)
+    scale = exposure(basis)
+    shown = lambda name: display(scene.known(scene.images[name]), scale)
+    judged = [n for n in scene.images if n not in (NOISY, REFERENCE)] or scene.images
+    errors = [np.mean((shown(name) - display(basis, scale)) ** 2, axis=-1) for name in judged]
+    return np.ptp(errors, axis=0) if len(errors) > 1 else errors[0]
 
 
 def pack(image: np.ndarray, unit: float = 1) -> str:

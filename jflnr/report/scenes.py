@@ -50,6 +50,10 @@ class Scene:
             return np.asarray(image, np.float64)
         return metrics.reflected(self.frame, image)
 
+    def known(self, image: np.ndarray) -> np.ndarray:
+        """`radiance`, 0 where it is NaN or infinite."""
+        return np.nan_to_num(self.radiance(image), posinf=0, neginf=0)
+
     def measure(self, name: str) -> dict[str, float | None]:
         """The metrics of version `name` against the reference."""
         if self.frame is None or self.whole:
@@ -68,10 +72,7 @@ def of_frame(name: str, frame: Frame, denoised: dict[str, np.ndarray]) -> Scene:
 
 
 def collect(
-    paths: Sequence[Path],
-    spp: int,
-    reference: Path | None,
-    layers: Mapping[str, str] | None = None,
+    paths: Sequence[Path], spp: int, reference: Path | None, layers: Mapping[str, str] | None = None
 ) -> list[Scene]:
     """Read files of any kind and put together what belongs together.
 

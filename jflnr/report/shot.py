@@ -95,10 +95,8 @@ def collect_shot(paths: Sequence[Path], spp: int, layers: Mapping[str, str] | No
 def shot_data(shot: Shot) -> dict[str, Any]:
     """What the page needs to know of a shot, as JSON values. Raises as `Shot.scenes` does, and
     ValueError for one that is too large."""
-    lights = (np.nan_to_num(s.radiance(s.judge), posinf=0, neginf=0) for s in shot.scenes())
-    scale = exposure(np.array([np.mean(light) for light in lights]))
-    names, pictures, errors, bytes_there = [], [], [], 0
-    before = None
+    scale = exposure(np.array([np.mean(s.known(s.judge)) for s in shot.scenes()]))
+    names, pictures, errors, bytes_there, before = [], [], [], 0, None
     for scene in shot.scenes():
         names.append(scene.name)
         pictures.append([_png(display(scene.radiance(i), scale)) for i in scene.images.values()])

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from jflnr.cli import main
-from jflnr.cli.pipeline import pipelined
+from jflnr.cli.jobs import pipelined
 
 
 def test_results_come_in_order_and_each_job_passes_once():

@@ -11,7 +11,7 @@ from jflnr.frame import Frame
 from jflnr.images.guides import shrink
 from jflnr.large import memory
 from jflnr.large.pieces import pieces
-from jflnr.large.planes import Planes
+from jflnr.large.tiled import Planes
 from jflnr.methods import method_of
 
 # One unit in the last place of the shift or the scale, which whole and pieces may round apart, is

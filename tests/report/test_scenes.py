@@ -9,7 +9,7 @@ import pytest
 from jflnr import exr, layouts
 from jflnr.cli import main
 from jflnr.frame import Frame, write_frame
-from jflnr.report.crops import find_crops
+from jflnr.report.page import find_crops
 from jflnr.report.scenes import Scene, collect
 from tests.layouts.blender_passes import passes
 
