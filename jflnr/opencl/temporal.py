@@ -16,22 +16,12 @@ from jflnr.opencl.grids import brightness_defines
 from jflnr.opencl.moments import guide_arguments, guide_defines, run_on_rows
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.opencl.temporal_picture import follow
-from jflnr.regression.picture import WholePicture
-from jflnr.temporal import picture
+from jflnr.temporal import sequence
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.newly_seen import AROUND, BRIGHTER, NEAR
 from jflnr.temporal.picture import Past
 from jflnr.temporal.reproject import COSINE, OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import (
-    MODEL,
-    PAST,
-    TURNED,
-    State,
-    Temporal,
-    guide_count,
-    named,
-    prepared,
-)
+from jflnr.temporal.sequence import MODEL, PAST, TURNED, State, Temporal
 
 
 def start(
@@ -44,14 +34,11 @@ def start(
     """`jflnr.temporal.start`, on the device, of one light group."""
     context = default_context() if context is None else context
     checks.image("indirect", frame.indirect, 3)
-    if isinstance(named(frame, method), WholePicture):
-        return Past(*(context.array(np.asarray(zeros)) for zeros in picture.nothing(frame)))
-    height, width = frame.normal.shape[:2]
-    zeros = lambda channels: context.array(np.zeros((height, width, channels), np.float32))
-    surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))
-    light, image = (Average(zeros(3), zeros(1)) for _ in range(2))
-    count = guide_count(frame, method, guides)
-    return State(surface, light, zeros(count), image, no_evidence(context, height, width))
+    zeros = sequence.start(frame, method, guides=guides)
+    state = jax.tree.map(lambda layer: to_device(context, layer), zeros)
+    if isinstance(state, Past):
+        return state
+    return state._replace(evidence=no_evidence(context, *frame.indirect.shape[:2]))
 
 
 @one_sentence()
@@ -75,7 +62,7 @@ def step(
     Raises `ValueError` or `TypeError` naming the argument; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
-    method, names, inputs = prepared(state, frame, method, guides, options)
+    method, names, inputs = sequence.prepared(state, frame, method, guides, options)
     filters = twins.filters_on(context)
     given = method.images(inputs, names, filters=filters)
     if isinstance(state, Past):
