@@ -8,7 +8,7 @@ What one frame leaves to the next is a `History`, so that `jax.lax.scan` goes ov
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -108,16 +108,10 @@ def step(history: History, frame: Frame, method: BMFR = PAPER) -> tuple[History,
     taps = find_taps(moved, Surface.of(frame), history.surface)
     sample = jnp.where(inside, frame.indirect, jnp.nan)
     light, count = accumulate_light(taps, history, sample, method.light_share)
-    fitted = fit(
-        jnp.where(count > 0, light, jnp.nan),
-        features(frame),
-        inside,
-        history.number,
-        grid_offset(history.number, method.block),
-        block=method.block,
-        noise=method.noise,
-        squares=3,
-    )
+    sampled = jnp.where(count > 0, light, jnp.nan)
+    number, offset = history.number, grid_offset(history.number, method.block)
+    options: dict[str, Any] = {"block": method.block, "noise": method.noise, "squares": 3}
+    fitted = fit(sampled, features(frame), inside, number, offset, **options)
     fitted = accumulate_fitted(taps, history, fitted, count, method.fitted_share)
     known = history.samples > 0
     albedo = jnp.asarray(frame.albedo)

@@ -1,7 +1,7 @@
 """Adaptive FLR on OpenCL devices: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 from jflnr.checks import one_sentence
 from jflnr.opencl.apply import Restored, apply
@@ -9,29 +9,16 @@ from jflnr.opencl.arguments import run_on_images
 from jflnr.opencl.context import Context
 from jflnr.opencl.energy import frame_mean, own_light, rescale, restore
 from jflnr.opencl.grids import Grid, Images, Run
-from jflnr.opencl.level import Level, fit_level, fit_pilot
+from jflnr.opencl.level import Step, fit_level, fit_pilot
 from jflnr.opencl.merge import choose, merge, signal_share
-from jflnr.opencl.moments import centre, collect
+from jflnr.opencl.moments import centre, collect, collect_weighted
 from jflnr.opencl.resampling import halve
 from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weigh import collect_blocks
-from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.parameters import numbers_of
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
 from jflnr.regression.arguments import channel_count
 from jflnr.regression.auto import Auto
-
-
-class Step(NamedTuple):
-    """One level finer than what was known before; see `jflnr.regression.multiscale.Step`.
-
-    fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
-    coarser grid.
-    """
-
-    fine: Level
-    coarse: Level
-    share: Grid
 
 
 @one_sentence()

@@ -52,7 +52,7 @@ def run_on_images(
     images = context.array(pixels), fitted, to_weight(context, weight), mapped
     error = told = None
     if getattr(method, "with_error", False):
-        error, told = to_output(context, (*size, 1), None, on_device)
+        error, told = to_output(context, (*size, 1), on_device=on_device)
     write(context, images, method, output, error)
     for array in (output, error):
         if unit != 1 and array is not None:
@@ -135,7 +135,7 @@ def to_weight(context: Context, weight: Any | None) -> Any | None:
 
 
 def to_output(
-    context: Context, shape: tuple[int, int, int], out: Any | None, on_device: bool
+    context: Context, shape: tuple[int, ...], out: Any | None = None, on_device: bool = False
 ) -> tuple[Any, Any]:
     """The device array to write to, and what the caller gets: that array or a numpy array."""
     if out is None and on_device:

@@ -43,8 +43,7 @@ def step(
     """
     context = default_context() if context is None else context
     pipeline.check(frame)
-    height, width = frame.indirect.shape[:2]
-    output, result = to_output(context, (height, width, 3), None, on_device)
+    output, result = to_output(context, frame.indirect.shape, on_device=on_device)
     layers: dict[str, Any] = {
         "sample": frame.indirect,
         "motion": pipeline.motion(frame),
