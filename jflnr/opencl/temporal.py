@@ -34,8 +34,8 @@ def start(
     """`jflnr.temporal.start`, on the device, of one light group."""
     context = default_context() if context is None else context
     checks.image("indirect", frame.indirect, 3)
-    zeros = sequence.start(frame, method, guides=guides)
-    state = jax.tree.map(lambda layer: to_device(context, layer), zeros)
+    like = jax.eval_shape(lambda: sequence.start(frame, method, guides=guides))
+    state = jax.tree.map(lambda of: context.array(np.zeros(of.shape, np.float32)), like)
     if isinstance(state, Past):
         return state
     return state._replace(evidence=no_evidence(context, *frame.indirect.shape[:2]))
