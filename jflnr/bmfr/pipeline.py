@@ -104,7 +104,7 @@ def step(history: History, frame: Frame, method: BMFR = PAPER) -> tuple[History,
     Raises `ValueError` for a layer of the wrong shape.
     """
     check(frame)
-    moved, inside = motion(frame), covered(frame)
+    moved, inside = motion(frame), coverage(frame) > 0
     taps = find_taps(moved, Surface.of(frame), history.surface)
     sample = jnp.where(inside, frame.indirect, jnp.nan)
     light, count = accumulate_light(taps, history, sample, method.light_share)
@@ -137,9 +137,9 @@ def motion(frame: Frame) -> Array:
     return jnp.zeros((*frame.depth.shape[:2], 2)) if frame.motion is None else frame.motion
 
 
-def covered(frame: Frame) -> Array:
-    """Whether there is a surface to denoise, `(H, W, 1)`."""
-    return (frame.depth if frame.mask is None else frame.mask) > 0
+def coverage(frame: Frame) -> Array:
+    """Above 0 where there is a surface to denoise, `(H, W, 1)`."""
+    return frame.depth if frame.mask is None else frame.mask
 
 
 def features(frame: Frame) -> jax.Array:

@@ -50,7 +50,7 @@ def step(
         "normal": frame.normal,
         "depth": frame.depth,
         "position": pipeline.position(frame),
-        "surface": frame.depth if frame.mask is None else frame.mask,
+        "surface": pipeline.coverage(frame),
         "albedo": frame.albedo,
     }
     layers = {name: to_device(context, layer) for name, layer in layers.items()}

@@ -63,13 +63,11 @@ def step(
     """
     context = default_context() if context is None else context
     method, names, inputs = sequence.prepared(state, frame, method, guides, options)
-    filters = twins.filters_on(context)
-    given = method.images(inputs, names, filters=filters)
+    given = method.images(inputs, names, filters=twins.filters_on(context))
     if isinstance(state, Past):
         found = twins.regress(method, given, context)
-        past = follow(context, state, found["image"], found["error"], frame.motion)
-        average: Any = past.picture
-        return past, average if on_device else average.get()
+        state = follow(context, state, found["image"], found["error"], frame.motion)
+        return state, state.picture if on_device else state.picture.get()
     layers = to_layers(context, given["guides"])
     sample, motion = (to_device(context, layer) for layer in (given["target"], frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
@@ -77,18 +75,14 @@ def step(
     covered = to_device(context, np.asarray(weight, np.float32))
 
     light, kept, image, expected, known = reproject(context, state, surface, motion, covered)
-    change, evidence = find_change(
-        context, sample, light.mean, expected, known, covered, layers, state.evidence,
-        temporal.caution,
-    )  # fmt: skip
-    least = temporal.light, temporal.image
-    light, weight, kept = accumulate(
-        context, light, kept, layers, change, sample, covered, least[0]
-    )
+    compared = sample, light.mean, expected, known, covered, layers
+    change, evidence = find_change(context, *compared, state.evidence, temporal.caution)
+    changed = context, change, covered
+    light, weight, kept = accumulate(*changed, light, sample, temporal.light, layers, kept)
     images = {"target": light.mean, "guides": kept, "guides_map": layers, "weight": weight}
     fit = twins.regress(method, images, context, on_device=True)["image"]
     new = known, weight, surface.depth
-    image, *_ = accumulate(context, image, None, (), change, fit, covered, least[1], new)
+    image, *_ = accumulate(*changed, image, fit, temporal.image, new=new)
     result: Any = image.mean
     context.finish(result, result)
     state = State(surface, light, kept, image, evidence)
@@ -124,19 +118,19 @@ def reproject(
 
 def accumulate(
     context: Context,
-    before: Average,
-    kept: Any | None,
-    guides: tuple[Any, ...],
     change: Change,
-    image: Any,
     covered: Any,
+    before: Average,
+    image: Any,
     least: float,
+    guides: tuple[Any, ...] = (),
+    kept: Any | None = None,
     new: tuple[Any, ...] = (None, None, None),
 ) -> tuple[Average, Any, Any]:
     """An average that follows the change, with `image` in it; what its pixels weigh in a fit,
     `(H, W)`; and the average `kept`, `(H, W, Q)`, with `guides`.
 
-    image: `(H, W, 3)`. covered: `(H, W, 1)`, what they weigh besides. least: share of the image.
+    covered: `(H, W, 1)`, what they weigh besides. image: `(H, W, 3)`. least: its share.
     new: what `bounded` of jflnr/temporal/newly_seen.py takes besides the image, if it is to be.
     """
     height, width = image.shape[:2]
