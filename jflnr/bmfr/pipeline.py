@@ -8,7 +8,7 @@ What one frame leaves to the next is a `History`, so that `jax.lax.scan` goes ov
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -104,20 +104,14 @@ def step(history: History, frame: Frame, method: BMFR = PAPER) -> tuple[History,
     Raises `ValueError` for a layer of the wrong shape.
     """
     check(frame)
-    moved, inside = motion(frame), covered(frame)
+    moved, inside = motion(frame), coverage(frame) > 0
     taps = find_taps(moved, Surface.of(frame), history.surface)
     sample = jnp.where(inside, frame.indirect, jnp.nan)
     light, count = accumulate_light(taps, history, sample, method.light_share)
-    fitted = fit(
-        jnp.where(count > 0, light, jnp.nan),
-        features(frame),
-        inside,
-        history.number,
-        grid_offset(history.number, method.block),
-        block=method.block,
-        noise=method.noise,
-        squares=3,
-    )
+    sampled = jnp.where(count > 0, light, jnp.nan)
+    number, offset = history.number, grid_offset(history.number, method.block)
+    options: dict[str, Any] = {"block": method.block, "noise": method.noise, "squares": 3}
+    fitted = fit(sampled, features(frame), inside, number, offset, **options)
     fitted = accumulate_fitted(taps, history, fitted, count, method.fitted_share)
     known = history.samples > 0
     albedo = jnp.asarray(frame.albedo)
@@ -143,9 +137,9 @@ def motion(frame: Frame) -> Array:
     return jnp.zeros((*frame.depth.shape[:2], 2)) if frame.motion is None else frame.motion
 
 
-def covered(frame: Frame) -> Array:
-    """Whether there is a surface to denoise, `(H, W, 1)`."""
-    return (frame.depth if frame.mask is None else frame.mask) > 0
+def coverage(frame: Frame) -> Array:
+    """Above 0 where there is a surface to denoise, `(H, W, 1)`."""
+    return frame.depth if frame.mask is None else frame.mask
 
 
 def features(frame: Frame) -> jax.Array:

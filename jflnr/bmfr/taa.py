@@ -27,9 +27,8 @@ def smooth(
     nothing is known from before, it is taken as it is.
     Returns `(H, W, 3)`.
     """
-    place = where_it_was(motion)
-    was_there = inside(place, picture.shape[:2])[..., None]
-    place = jnp.where(was_there[..., 0], place, 0)
+    place, inside = where_it_was(motion)
+    was_there, place = inside[..., None], jnp.where(inside, place, 0)
     read = lambda channel: map_coordinates(channel, list(place), order=1, mode="nearest")
     counted = jnp.concatenate([jnp.where(known, before, 0), known], axis=-1)
     *sums, weight = (read(counted[..., c]) for c in range(4))
@@ -41,16 +40,13 @@ def smooth(
     return jnp.where(was_there, mixed @ jnp.array(RGB).T, picture)
 
 
-def where_it_was(motion: Array) -> jax.Array:
-    """Row and column of each pixel in the previous frame, `(2, H, W)`."""
+def where_it_was(motion: Array) -> tuple[jax.Array, jax.Array]:
+    """Row and column of each pixel in the previous frame, `(2, H, W)`, and whether that lies among
+    the pixels' centres, `(H, W)`; NaN does not."""
     y, x = jnp.mgrid[: motion.shape[0], : motion.shape[1]]
-    return jnp.stack([y + motion[..., 1], x + motion[..., 0]])
-
-
-def inside(place: jax.Array, size: tuple[int, ...]) -> jax.Array:
-    """Whether a place `(2, H, W)` lies among the pixels' centres, `(H, W)`; NaN does not."""
-    last = jnp.array(size)[:, None, None] - 1
-    return jnp.all((place >= 0) & (place <= last), axis=0)
+    place = jnp.stack([y + motion[..., 1], x + motion[..., 0]])
+    last = jnp.array(motion.shape[:2])[:, None, None] - 1
+    return place, jnp.all((place >= 0) & (place <= last), axis=0)
 
 
 def neighbourhood(colour: jax.Array) -> tuple[jax.Array, jax.Array]:

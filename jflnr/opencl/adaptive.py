@@ -1,56 +1,27 @@
 """Adaptive FLR on OpenCL devices: the steps of jflnr/regression/adaptive.py (docs/adaptive.md)."""
 
 import dataclasses
-import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from jflnr.checks import one_sentence
 from jflnr.opencl.apply import Restored, apply
-from jflnr.opencl.arguments import (
-    check_guides,
-    in_passes,
-    to_image,
-    to_layers,
-    to_output,
-    to_weight,
-)
-from jflnr.opencl.context import Context, default_context, is_device_array
+from jflnr.opencl.arguments import run_on_images
+from jflnr.opencl.context import Context
 from jflnr.opencl.energy import frame_mean, own_light, rescale, restore
 from jflnr.opencl.grids import Grid, Images, Run
-from jflnr.opencl.level import Level, fit_level, fit_pilot
+from jflnr.opencl.level import Step, fit_level, fit_pilot
 from jflnr.opencl.merge import choose, merge, signal_share
-from jflnr.opencl.moments import centre, collect
+from jflnr.opencl.moments import centre, collect, collect_weighted
 from jflnr.opencl.resampling import halve
 from jflnr.opencl.uncertainty import standard_error
 from jflnr.opencl.weigh import collect_blocks
-from jflnr.opencl.weighted_moments import collect_weighted
 from jflnr.parameters import numbers_of
 from jflnr.regression.adaptive import DEFAULT, AdaptiveFLR
-from jflnr.regression.arguments import channel_count, check_regression, layers_of
+from jflnr.regression.arguments import channel_count
 from jflnr.regression.auto import Auto
 
 
-class Step(NamedTuple):
-    """One level finer than what was known before; see `jflnr.regression.multiscale.Step`.
-
-    fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
-    coarser grid.
-    """
-
-    fine: Level
-    coarse: Level
-    share: Grid
-
-
-# Light above this is divided by a power of two first: its squares would leave float32.
-BRIGHT = 1e15
-
-
 @one_sentence()
-@in_passes
 def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flr_adaptive` on an OpenCL device: same arguments, same result.
 
@@ -64,42 +35,6 @@ def flr_adaptive(target: Any, guides: Any, method: AdaptiveFLR = DEFAULT, **opti
     return run_on_images(write, target, guides, method, **options)
 
 
-def run_on_images(
-    write: Callable[[Context, Images, Any, Any, Any | None], None],
-    target: Any,
-    guides: Any,
-    method: Any,
-    *,
-    guides_map: Any | None = None,
-    weight: Any | None = None,
-    context: Context | None = None,
-    out: Any | None = None,
-    on_device: bool = False,
-    **options: Any,
-) -> Any:
-    """What `flr_adaptive` returns. write: the result, from images and method, to a device array,
-    and its error to another one or to none."""
-    context = default_context() if context is None else context
-    factor = check_regression(target, guides, guides_map, weight)
-    method = dataclasses.replace(method, **options, factor=factor)
-    method = method.ready(check_guides(guides), target.shape[2])
-    size = (layers_of(guides_map) or [target])[0].shape[:2]
-    output, result = to_output(context, (*size, target.shape[2]), out, on_device)
-    pixels, unit = in_unit(target)
-    fitted = to_layers(context, guides)
-    mapped = fitted if guides_map is None else to_layers(context, guides_map)
-    images = context.array(pixels), fitted, to_weight(context, weight), mapped
-    error = told = None
-    if method.with_error:
-        error, told = to_output(context, (*size, 1), None, on_device)
-    write(context, images, method, output, error)
-    for array in (output, error):
-        if unit != 1 and array is not None:
-            context.scale(array, unit)
-    image = context.finish(output, result)
-    return image if error is None else (image, context.finish(error, told))
-
-
 def write(
     context: Context, images: Images, method: AdaptiveFLR, output: Any, error: Any | None
 ) -> None:
@@ -109,23 +44,6 @@ def write(
     write_light(context, images, method, image, error)
     if method.keep_energy:
         rescale(context, image, images, output, error=error)
-
-
-def in_unit(target: Any) -> tuple[Any, np.float32]:
-    """The light, divided by what follows if it is so bright that its squares overflow.
-
-    Told from a sparse grid; 1 where the light is on the device already.
-    """
-    pixels = to_image(target)
-    if is_device_array(pixels):
-        return pixels, np.float32(1)
-    rows, columns = (slice(None, None, max(size // 32, 1)) for size in pixels.shape[:2])
-    sample = np.abs(pixels[rows, columns])
-    largest = float(np.max(sample, where=np.isfinite(sample), initial=0))
-    if largest <= BRIGHT:
-        return pixels, np.float32(1)
-    unit = np.float32(2.0 ** (math.frexp(largest)[1] - 1))
-    return pixels / unit, unit
 
 
 def write_light(

@@ -1,6 +1,6 @@
 """BMFR on an OpenCL device: host side of kernels_cl/bmfr/; its twin is jflnr/bmfr/pipeline.py."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,97 +43,82 @@ def step(
     """
     context = default_context() if context is None else context
     pipeline.check(frame)
-    height, width = frame.indirect.shape[:2]
-    output, result = to_output(context, (height, width, 3), None, on_device)
+    output, result = to_output(context, frame.indirect.shape, on_device=on_device)
     layers: dict[str, Any] = {
         "sample": frame.indirect,
         "motion": pipeline.motion(frame),
         "normal": frame.normal,
         "depth": frame.depth,
         "position": pipeline.position(frame),
-        "surface": frame.depth if frame.mask is None else frame.mask,
+        "surface": pipeline.coverage(frame),
         "albedo": frame.albedo,
     }
     layers = {name: to_device(context, layer) for name, layer in layers.items()}
-    depths = frame.position is None
-    light, count, accepted = accumulate_light(context, history, layers, method, depths)
-    fitted = fit(context, light, count, layers, history.number, method.block, method.noise)
-    mean, picture = accumulate_fitted(context, history, layers, method, fitted, count, accepted)
-    smooth = taa(context, history, layers, method, picture, mean, output)
+    now = Step(context, history, layers, method)
+    light, count, accepted = accumulate_light(now, depths=frame.position is None)
+    fitted = fit(context, light, count, layers, history.number, method)
+    mean, picture = accumulate_fitted(now, fitted, count, accepted)
+    smooth = taa(now, picture, mean, output)
     surface = Surface(layers["normal"], layers["depth"], layers["position"])
     following = History(history.number + 1, surface, count, light, mean, smooth)
     return following, context.finish(output, result)
 
 
-def accumulate_light(
-    context: Context, history: History, layers: dict[str, Any], method: BMFR, depths: bool
-) -> tuple[Any, Any, Any]:
+class Step(NamedTuple):
+    """What the phases of one frame share. layers: of the frame, by name, on the device."""
+
+    context: Context
+    history: History
+    layers: dict[str, Any]
+    method: BMFR
+
+    def run(self, name: str, arguments: tuple[Any, ...], **defines: int | float) -> None:
+        """Enqueue kernels_cl/bmfr/`name`.cl on all pixels."""
+        height, width = self.layers["motion"].shape[:2]
+        features = self.layers["normal"], self.layers["position"]
+        given = guide_defines(features, 3) | defines
+        run_on_rows(self.context, name, f"bmfr/{name}.cl", given, (width, height, *arguments))
+
+
+def accumulate_light(now: Step, depths: bool) -> tuple[Any, Any, Any]:
     """Phase I: mean of the samples at each place; see `jflnr.bmfr.pipeline.accumulate_light`.
 
     depths: tell surfaces apart by depth. Returns the mean `(H, W, 3)`, the number of samples
     `(H, W, 1)`, and a bit for every accepted tap, `(H, W)`.
     """
-    height, width = layers["sample"].shape[:2]
-    light, count = context.empty((height, width, 3)), context.empty((height, width, 1))
-    accepted = context.empty((height, width), np.uint8)
-    before = history.surface
+    context, history, layers, method = now
+    size, before = layers["sample"].shape[:2], history.surface
+    light, count = context.empty((*size, 3)), context.empty((*size, 1))
+    accepted = context.empty(size, np.uint8)
     arguments = (
         OFF_PLANE, SAME_NORMAL, COSINE, layers["motion"], layers["normal"], layers["depth"],
         layers["position"], before.normal, before.depth, before.position, method.light_share,
         layers["sample"], layers["surface"], history.samples, history.light, light, count, accepted,
     )  # fmt: skip
-    defines = {"MOST": pipeline.MOST_SAMPLES} | ({"DEPTHS": 1} if depths else {})
-    run(context, "accumulate_light", layers, arguments, defines)
+    defines = {"DEPTHS": 1} if depths else {}
+    now.run("accumulate_light", arguments, MOST=pipeline.MOST_SAMPLES, **defines)
     return light, count, accepted
 
 
-def accumulate_fitted(
-    context: Context,
-    history: History,
-    layers: dict[str, Any],
-    method: BMFR,
-    fitted: Any,
-    count: Any,
-    accepted: Any,
-) -> tuple[Any, Any]:
+def accumulate_fitted(now: Step, fitted: Any, count: Any, accepted: Any) -> tuple[Any, Any]:
     """Phase III: mean of the fitted light, `(H, W, 3)`, and that times albedo, `(3, H, W)`."""
-    height, width = fitted.shape[:2]
-    mean, picture = context.empty(fitted.shape), context.empty((3, height, width))
+    context, history, layers, method = now
+    mean, picture = context.empty(fitted.shape), context.empty((3, *fitted.shape[:2]))
     arguments = (
         method.fitted_share, fitted, layers["albedo"], layers["motion"], accepted, count,
         history.fitted, mean, picture,
     )  # fmt: skip
-    run(context, "accumulate_fitted", layers, arguments, {"WHITEST": WHITEST})
+    now.run("accumulate_fitted", arguments, WHITEST=WHITEST)
     return mean, picture
 
 
-def taa(
-    context: Context,
-    history: History,
-    layers: dict[str, Any],
-    method: BMFR,
-    picture: Any,
-    mean: Any,
-    image: Any,
-) -> Any:
+def taa(now: Step, picture: Any, mean: Any, image: Any) -> Any:
     """Phase III: the smoothed picture, `(H, W, 3)`; writes `image`, the same without albedo."""
+    context, history, layers, method = now
     smooth = context.empty(mean.shape)
     arguments = (
         method.picture_share, DARK, picture, history.picture, history.samples, layers["motion"],
         layers["albedo"], layers["surface"], mean, smooth, image,
     )  # fmt: skip
-    run(context, "taa", layers, arguments, {"WHITEST": WHITEST})
+    now.run("taa", arguments, WHITEST=WHITEST)
     return smooth
-
-
-def run(
-    context: Context,
-    name: str,
-    layers: dict[str, Any],
-    arguments: tuple[Any, ...],
-    defines: dict[str, Any] | None = None,
-) -> None:
-    """Enqueue kernels_cl/bmfr/`name`.cl on all pixels."""
-    height, width = layers["motion"].shape[:2]
-    defines = guide_defines((layers["normal"], layers["position"]), 3) | (defines or {})
-    run_on_rows(context, name, f"bmfr/{name}.cl", defines, (width, height, *arguments))

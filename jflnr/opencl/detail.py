@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from jflnr.opencl.arguments import to_device
+from jflnr.opencl.arguments import to_device, to_output
 from jflnr.opencl.context import Context
 from jflnr.opencl.edges import average
 from jflnr.opencl.moments import guide_defines
@@ -34,7 +34,6 @@ def composed(images: Parts, context: Context) -> np.ndarray:
     alike = np.full((height, width), ALIKE, np.float32)
     number, averages = average(context, steer, follow, usable, alike)
     run("shares", (w, h), w, h, number, averages, share)
-    result = np.empty(target.shape, np.float32)
-    output = context.to_fill(result)
+    output, result = to_output(context, target.shape)
     run("composed", size, w, h, dark, light, surface, own, averages, share, output)
     return context.finish(output, result)

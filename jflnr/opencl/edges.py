@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from jflnr.opencl.arguments import to_device
+from jflnr.opencl.arguments import to_device, to_output
 from jflnr.opencl.context import Context
 from jflnr.opencl.moments import guide_defines
 from jflnr.regression.features import NEAR, NOTHING, REACH, WIDTH, alike_of
@@ -45,12 +45,10 @@ def filter_layers(
         to += count
     alike = np.broadcast_to(alike_of(np.asarray(samples)), (height, width))
     number, averages = average(context, steer, follow, usable, alike)
-    results = [np.empty(image.shape, np.float32) for image in images]
-    outputs = [context.to_fill(result) for result in results]
-    for name, output in zip(layers, outputs, strict=True):
+    outputs = [to_output(context, image.shape) for image in images]
+    for name, (output, _) in zip(layers, outputs, strict=True):
         run("gather", name, places[name], NOTHING, number, averages, follow, output)
-    found = zip(outputs, results, strict=True)
-    return tuple(context.finish(output, result) for output, result in found)
+    return tuple(context.finish(*output) for output in outputs)
 
 
 def average(context: Context, steer: Any, follow: Any, usable: Any, alike: Any) -> tuple[Any, Any]:

@@ -7,15 +7,15 @@ from jflnr.checks import one_sentence
 from jflnr.network.flnr import DEFAULT, FLNR
 from jflnr.network.picture import PictureFLNR
 from jflnr.opencl import network
-from jflnr.opencl.adaptive import flr_adaptive, run_on_images, write_light
-from jflnr.opencl.arguments import in_passes
+from jflnr.opencl.adaptive import flr_adaptive, write_light
+from jflnr.opencl.arguments import run_on_images
 from jflnr.opencl.context import Context
 from jflnr.opencl.energy import rescale
 from jflnr.opencl.grids import Images
+from jflnr.regression.arguments import channel_count
 
 
 @one_sentence()
-@in_passes
 def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> Any:
     """`jflnr.flnr` on an OpenCL device; all else as of `flr_adaptive` of `adaptive.py`."""
     return run_on_images(write, target, guides, method, **options)
@@ -24,6 +24,7 @@ def flnr(target: Any, guides: Any, method: FLNR = DEFAULT, **options: Any) -> An
 def write(context: Context, images: Images, method: FLNR, output: Any, error: Any) -> None:
     """Write the corrected light, `(H, W, C)`, with about the brightness of the input, and, if that
     is not None, its error."""
+    method = method.ready(channel_count(images[1]), output.shape[2])
     light, image = context.empty(output.shape), context.empty(output.shape)
     noise = context.empty((*output.shape[:2], 1)) if error is None else error
     run = write_light(context, images, method, light, noise)

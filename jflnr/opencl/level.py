@@ -27,6 +27,18 @@ class Level(NamedTuple):
     tiles: Any | None = None
 
 
+class Step(NamedTuple):
+    """One level finer than what was known before; see `jflnr.regression.multiscale.Step`.
+
+    fine, coarse: this level and the coarser one, each on its own grid. share: one plane on the
+    coarser grid.
+    """
+
+    fine: Level
+    coarse: Level
+    share: Grid
+
+
 def fit_level(
     run: Run,
     moments: Grid,

@@ -27,11 +27,8 @@ def profile(context: Context, work: Callable[[], Any], repeats: int = 10) -> lis
     Each kernel's time is its smallest of `repeats` runs, from OpenCL's own clock.
     """
     work()  # compiles
-    best: dict[str, tuple[float, int]] = {}
-    for _ in range(repeats):
-        launches = _launches(context, work)
-        for name, (ms, moved) in launches.items():
-            best[name] = (min(ms, best.get(name, (ms, 0))[0]), moved)
+    runs = [_launches(context, work) for _ in range(repeats)]
+    best = {name: min(run[name] for run in runs) for name in runs[0]}
     copy_ms, copied = best.pop("copy")
     rate = copied / copy_ms
     total = sum(ms for ms, _ in best.values()), sum(moved for _, moved in best.values())

@@ -18,11 +18,7 @@ def solve(
     width = context.width()
     model = context.empty((guides + 1, channels, h, pitch))
     eps, eps_prime = map(float, regularisation(method))
-    context.run(
-        "solve",
-        "solve.cl",
-        {"Q": guides, "C": channels, "WIDTH": width},
-        (pitch // width, h),
-        (h, pitch, eps, eps_prime, shift, moments, model),
-    )
+    defines = {"Q": guides, "C": channels, "WIDTH": width}
+    arguments = h, pitch, eps, eps_prime, shift, moments, model
+    context.run("solve", "solve.cl", defines, (pitch // width, h), arguments)
     return model

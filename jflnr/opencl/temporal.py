@@ -16,22 +16,12 @@ from jflnr.opencl.grids import brightness_defines
 from jflnr.opencl.moments import guide_arguments, guide_defines, run_on_rows
 from jflnr.opencl.temporal_change import Change, find_change, no_evidence
 from jflnr.opencl.temporal_picture import follow
-from jflnr.regression.picture import WholePicture
-from jflnr.temporal import picture
+from jflnr.temporal import sequence
 from jflnr.temporal.accumulate import Average
 from jflnr.temporal.newly_seen import AROUND, BRIGHTER, NEAR
 from jflnr.temporal.picture import Past
 from jflnr.temporal.reproject import COSINE, OFF_PLANE, SAME_NORMAL, Surface
-from jflnr.temporal.sequence import (
-    MODEL,
-    PAST,
-    TURNED,
-    State,
-    Temporal,
-    guide_count,
-    named,
-    prepared,
-)
+from jflnr.temporal.sequence import MODEL, PAST, TURNED, State, Temporal
 
 
 def start(
@@ -44,14 +34,11 @@ def start(
     """`jflnr.temporal.start`, on the device, of one light group."""
     context = default_context() if context is None else context
     checks.image("indirect", frame.indirect, 3)
-    if isinstance(named(frame, method), WholePicture):
-        return Past(*(context.array(np.asarray(zeros)) for zeros in picture.nothing(frame)))
-    height, width = frame.normal.shape[:2]
-    zeros = lambda channels: context.array(np.zeros((height, width, channels), np.float32))
-    surface = Surface(zeros(3), zeros(1), None if frame.position is None else zeros(3))
-    light, image = (Average(zeros(3), zeros(1)) for _ in range(2))
-    count = guide_count(frame, method, guides)
-    return State(surface, light, zeros(count), image, no_evidence(context, height, width))
+    like = jax.eval_shape(lambda: sequence.start(frame, method, guides=guides))
+    state = jax.tree.map(lambda of: context.array(np.zeros(of.shape, np.float32)), like)
+    if isinstance(state, Past):
+        return state
+    return state._replace(evidence=no_evidence(context, *frame.indirect.shape[:2]))
 
 
 @one_sentence()
@@ -75,14 +62,12 @@ def step(
     Raises `ValueError` or `TypeError` naming the argument; `NoDevice` without a device.
     """
     context = default_context() if context is None else context
-    method, names, inputs = prepared(state, frame, method, guides, options)
-    filters = twins.filters_on(context)
-    given = method.images(inputs, names, filters=filters)
+    method, names, inputs = sequence.prepared(state, frame, method, guides, options)
+    given = method.images(inputs, names, filters=twins.filters_on(context))
     if isinstance(state, Past):
         found = twins.regress(method, given, context)
-        past = follow(context, state, found["image"], found["error"], frame.motion)
-        average: Any = past.picture
-        return past, average if on_device else average.get()
+        state = follow(context, state, found["image"], found["error"], frame.motion)
+        return state, state.picture if on_device else state.picture.get()
     layers = to_layers(context, given["guides"])
     sample, motion = (to_device(context, layer) for layer in (given["target"], frame.motion))
     surface = jax.tree.map(lambda layer: to_device(context, layer), Surface.of(frame))
@@ -90,18 +75,14 @@ def step(
     covered = to_device(context, np.asarray(weight, np.float32))
 
     light, kept, image, expected, known = reproject(context, state, surface, motion, covered)
-    change, evidence = find_change(
-        context, sample, light.mean, expected, known, covered, layers, state.evidence,
-        temporal.caution,
-    )  # fmt: skip
-    least = temporal.light, temporal.image
-    light, weight, kept = accumulate(
-        context, light, kept, layers, change, sample, covered, least[0]
-    )
+    compared = sample, light.mean, expected, known, covered, layers
+    change, evidence = find_change(context, *compared, state.evidence, temporal.caution)
+    changed = context, change, covered
+    light, weight, kept = accumulate(*changed, light, sample, temporal.light, layers, kept)
     images = {"target": light.mean, "guides": kept, "guides_map": layers, "weight": weight}
     fit = twins.regress(method, images, context, on_device=True)["image"]
     new = known, weight, surface.depth
-    image, *_ = accumulate(context, image, None, (), change, fit, covered, least[1], new)
+    image, *_ = accumulate(*changed, image, fit, temporal.image, new=new)
     result: Any = image.mean
     context.finish(result, result)
     state = State(surface, light, kept, image, evidence)
@@ -137,19 +118,19 @@ def reproject(
 
 def accumulate(
     context: Context,
-    before: Average,
-    kept: Any | None,
-    guides: tuple[Any, ...],
     change: Change,
-    image: Any,
     covered: Any,
+    before: Average,
+    image: Any,
     least: float,
+    guides: tuple[Any, ...] = (),
+    kept: Any | None = None,
     new: tuple[Any, ...] = (None, None, None),
 ) -> tuple[Average, Any, Any]:
     """An average that follows the change, with `image` in it; what its pixels weigh in a fit,
     `(H, W)`; and the average `kept`, `(H, W, Q)`, with `guides`.
 
-    image: `(H, W, 3)`. covered: `(H, W, 1)`, what they weigh besides. least: share of the image.
+    covered: `(H, W, 1)`, what they weigh besides. image: `(H, W, 3)`. least: its share.
     new: what `bounded` of jflnr/temporal/newly_seen.py takes besides the image, if it is to be.
     """
     height, width = image.shape[:2]

@@ -61,7 +61,9 @@ def find_change(
     grid, luminance = _arrange(run, moments, -(-sample.shape[1] // BLOCK))
     fit = fit_level(run, grid, BLOCK)
     model, wrong, evidence = _judge(run, fit, luminance, evidence, caution)
-    _add_uncovered(run, known, covered, grid, wrong)
+    # The history is wrong also around places that come into view.
+    uncovered = *known.shape, grid.size[1], BLOCK, UNCOVERED, known, covered, wrong
+    run.launch("add_uncovered", FILE, grid, uncovered, WIDTH=1)
     signal, noise = context.empty(sample.shape), context.empty((*sample.shape[:2], 1))
     apply(context, model, guides, shift, BLOCK, grid.sizes, signal)
     apply(context, wrong, (), shift, BLOCK, grid.sizes, noise)
@@ -116,9 +118,3 @@ def _judge(
         evidence, after.planes, model, wrong,
     )  # fmt: skip
     return model, wrong, after.planes
-
-
-def _add_uncovered(run: Run, known: Any, covered: Any, grid: Grid, wrong: Any) -> None:
-    """Adds what the history takes on around places that come into view to `wrong`."""
-    arguments = *known.shape, grid.size[1], BLOCK, UNCOVERED, known, covered, wrong
-    run.launch("add_uncovered", FILE, grid, arguments, WIDTH=1)

@@ -40,11 +40,7 @@ def known_on(context: Context) -> Known:
 
 
 def regress(
-    method: Any,
-    images: Parts,
-    context: Context,
-    out: Any | None = None,
-    **options: Any,
+    method: Any, images: Parts, context: Context, out: Any | None = None, **options: Any
 ) -> Parts:
     """`jflnr.stages.regress` on the device.
 

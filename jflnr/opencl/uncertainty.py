@@ -1,16 +1,12 @@
 """Host side of kernels_cl/uncertainty.cl; its twin in JAX is jflnr/regression/uncertainty.py."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jflnr.opencl.apply import apply
 from jflnr.opencl.grids import Grid, Run
+from jflnr.opencl.level import Step
 from jflnr.regression.uncertainty import DETAIL, LEFT_OUT, VARIANCE
-
-if TYPE_CHECKING:
-    from jflnr.opencl.adaptive import Step
 
 
 def standard_error(

@@ -89,9 +89,8 @@ def find_change(
     fit = fit_level(grid, shift, difference.shape[-1], jnp.ones(()), numbers)
     found = predict(fit.coefficients, mean_guides(grid.moments, shift.size))
     luminance = total / jnp.maximum(count, 1e-12)
-    share, noise, evidence = _judge(
-        fit, found, luminance, grid.moments[0] > 1e-12, evidence, caution
-    )
+    there = grid.moments[0] > 1e-12
+    share, noise, evidence = _judge(fit, found, luminance, there, evidence, caution)
     noise += _uncovered(known, new)
     signal = apply(share * fit.coefficients, guides, shift, BLOCK)
     noise = apply(noise[None, None], jnp.zeros((*light.shape, 0)), shift[:0], BLOCK)

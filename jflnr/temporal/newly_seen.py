@@ -39,6 +39,5 @@ def bounded(image: jax.Array, known: jax.Array, weight: jax.Array, depth: Array)
             summed += jnp.where(counts > 0, counts * shown, 0)
     mean = divide(summed, total)
     share = divide(jnp.clip(light, mean / BRIGHTER, mean * BRIGHTER), light)
-    return jnp.where(
-        (~known & (seen > 0) & (light > 0))[..., None], image * share[..., None], image
-    )
+    new = ~known & (seen > 0) & (light > 0)
+    return jnp.where(new[..., None], image * share[..., None], image)

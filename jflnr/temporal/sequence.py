@@ -73,7 +73,8 @@ def start(
     Returns a `State`, or of a method of whole pictures a `picture.Past`.
     """
     checks.image("indirect", frame.indirect)
-    if isinstance(named(frame, method), WholePicture):
+    method = named(frame, method)
+    if isinstance(method, WholePicture):
         return picture.nothing(frame)
     height, width, channels = frame.indirect.shape
     surface = jax.tree.map(lambda layer: jnp.zeros(layer.shape), Surface.of(frame))
@@ -83,8 +84,7 @@ def start(
 
 
 def guide_count(frame: Frame, method: Any, guides: Sequence[str] | None) -> int:
-    """Channels of the guides that a method takes of a frame; arguments as of `step`."""
-    method = named(frame, method)
+    """Channels of the guides that a method takes of a frame."""
     return channel_count([getattr(frame, name) for name in guides_of(frame, guides, method)])
 
 
@@ -116,8 +116,8 @@ def step(
         past = _picture_step(state, inputs, frame.motion, method, names)
         return past, past.picture
     surface = jax.tree.map(jnp.asarray, Surface.of(frame))
-    images = inputs, frame.motion, surface
-    light, kept, image, evidence = _step(state, *images, method, temporal, names)
+    found = _step(state, inputs, frame.motion, surface, method, temporal, names)
+    light, kept, image, evidence = found
     # The surface and the image twice would be copied if the program returned them.
     return State(surface, light, kept, image, evidence), image.mean
 
@@ -178,15 +178,9 @@ def _step(
         for average, turned in zip(averages, TURNED, strict=True)
     )
     known, covered = light.samples[..., 0] > 0, True if weight is None else weight > 0
-    change, evidence = find_change(
-        target - light.mean[..., :channels],
-        light_of(image.mean),
-        images["guides"],
-        jnp.where(known & covered, 1.0, 0.0),
-        jnp.where(~known & covered, 1.0, 0.0),
-        state.evidence,
-        temporal.caution,
-    )
+    compared = target - light.mean[..., :channels], light_of(image.mean), images["guides"]
+    old, new = (jnp.where(there & covered, 1.0, 0.0) for there in (known, ~known))
+    change, evidence = find_change(*compared, old, new, state.evidence, temporal.caution)
     pixels = jnp.concatenate([target, *layers_of(images["guides"])], axis=-1)
     light = accumulate(_changed(light, change), pixels, temporal.light)
     # The more frames a pixel holds the more it counts, until the model is what is wrong.
