@@ -113,7 +113,4 @@ def _product(a: jax.Array, b: jax.Array) -> jax.Array:
     return jnp.sum(a[:, :, None] * b, axis=1)
 
 
-SOLVERS: dict[str, Solve] = {
-    "cholesky": cholesky_solve,
-    "block-inverse": block_inverse_solve,
-}
+SOLVERS: dict[str, Solve] = {"cholesky": cholesky_solve, "block-inverse": block_inverse_solve}

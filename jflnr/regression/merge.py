@@ -10,11 +10,7 @@ from jflnr.regression.window import gather
 
 
 def signal_share(
-    grid: Grid,
-    fine: Fit,
-    coarse: Fit,
-    reference: jax.Array,
-    caution: jax.Array | float,
+    grid: Grid, fine: Fit, coarse: Fit, reference: jax.Array, caution: jax.Array | float
 ) -> jax.Array:
     """The share of signal in the difference d between two levels, in [0, 1], on the coarser grid.
 

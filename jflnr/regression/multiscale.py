@@ -8,7 +8,7 @@ from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
 from jflnr.regression.merge import signal_share
 from jflnr.regression.moments import channels_of
-from jflnr.regression.resampling import double, double_all, halve
+from jflnr.regression.resampling import double, double_all, halve_inside
 from jflnr.stages import Known
 
 if TYPE_CHECKING:
@@ -68,16 +68,11 @@ def fit_levels(numbers: AdaptiveFLR, moments: jax.Array, known: Known) -> tuple[
     return first, steps
 
 
-def in_tiles(share: jax.Array) -> jax.Array:
-    """Means over the tiles of the share of signal in the step before the finest, `(h, w)`."""
-    return (halve(share[None]) / halve(jnp.ones_like(share)[None]))[0]
-
-
 def chosen(share: jax.Array, worth: jax.Array | float, height: int, width: int) -> jax.Array:
     """Whether a block of the finest grid, `(height, width)`, lies in a tile that is refined.
 
     Those are all where more than `worth` of what the step before added was signal: where that was
     noise, what is finer still is noise too. share: of that step.
     """
-    where = in_tiles(share) > worth
+    where = halve_inside(share) > worth
     return jnp.repeat(jnp.repeat(where, TILE, 0), TILE, 1)[:height, :width]

@@ -118,8 +118,8 @@ def solve_strips(
 
     def strip(first: jax.Array | int, rows: int) -> jax.Array:
         given = cut((moments, eps, eps_prime), first, rows, axis=-2)
-        planes, *regular = lax.optimization_barrier(given)
-        system = normal_equations(planes, shift, *regular, channels, ROUNDING_OF_STRIPS)
+        planes, own, own_prime = lax.optimization_barrier(given)
+        system = normal_equations(planes, shift, own, own_prime, channels, ROUNDING_OF_STRIPS)
         return system.models(by_its_equation(eliminate, system.correlation, system.right))
 
     height, width = moments.shape[1:]
