@@ -171,11 +171,11 @@ def _record(noisy: Noisy, target: np.ndarray, random: np.random.Generator) -> np
         errors.append(np.mean((display(albedo * found.light, unit * scale) - wanted) ** 2))
     still = {name: getattr(found, name) for name in read._fields if name not in read.OF_NOISE}
     still |= {"by": albedo, "target": np.clip(target * scale, 0, BRIGHTEST)}
+    half = still | {name: fields[name] for name in read.OF_NOISE}
     groups = np.searchsorted(GROUPS, fields["spp"], side="right")
     own = [np.mean([e for e, g in zip(errors, groups, strict=True) if g == k]) for k in groups]
     images: dict[str, np.ndarray]
-    images = {name: np.asarray(value, np.float16) for name, value in still.items()}
-    images |= {name: np.asarray(fields[name], np.float16) for name in read.OF_NOISE}
+    images = {name: np.asarray(value, np.float16) for name, value in half.items()}
     images |= {"spp": np.array(fields["spp"]), "group": groups}
     images |= {"exposure": np.array(fields["exposure"], np.float32)}
     images |= {"before": np.maximum(own, LEAST_ERROR).astype(np.float32)}

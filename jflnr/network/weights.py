@@ -24,20 +24,11 @@ FOLDER = Path(__file__).parent / "weights"
 
 
 def save(
-    path: str | Path,
-    params: unet.Params,
-    widths: tuple[int, ...],
-    read: Any = Read,
-    **about: Any,
+    path: str | Path, params: unet.Params, widths: tuple[int, ...], read: Any = Read, **about: Any
 ) -> None:
     """Write weights in half precision. read: what the network reads, as `features.Read`. about:
     anything else worth knowing, such as the score."""
-    header = {
-        "format": FORMAT,
-        "widths": list(widths),
-        **_known(read),
-        **about,
-    }
+    header = {"format": FORMAT, "widths": list(widths), **_known(read), **about}
     half = {name: np.asarray(value, np.float16) for name, value in params.items()}
     arrays.write(path, header, half, compress=True)
 

@@ -21,18 +21,17 @@ from jflnr.regression import energy
 from jflnr.regression.apply import apply, guides_to_map
 from jflnr.regression.arguments import channel_count, check_options, check_regression
 from jflnr.regression.floor import with_own_light
-from jflnr.regression.level import Fit, Grid, brightness, fit_level, mean_guides
+from jflnr.regression.level import Grid, brightness, fit_level, mean_guides
 from jflnr.regression.moments import (
     Guides,
     centre,
-    channels_of,
     collect,
     collect_weighted,
     index_xy,
     unit_of,
     usable,
 )
-from jflnr.regression.multiscale import TILE, Step, fit_levels, merged_models
+from jflnr.regression.multiscale import TILE, fit_levels
 from jflnr.regression.resampling import halve
 from jflnr.regression.uncertainty import DETAIL, block_error
 from jflnr.regression.window import REACH
@@ -215,15 +214,11 @@ def counted(light: jax.Array, guides: int) -> Parts:
 
 
 def learn_mean(method: Any, known: Known, sums: Parts) -> Known:
-    """The frame's brightness, in the mean and in sum."""
+    """The brightness of the usable pixels, in sum and in the mean, which is 1 if there is no light,
+    where any scale will do."""
     count, light = sums["counted"]
-    return {"mean": mean_light(count, light), "wanted": light}
-
-
-def mean_light(count: jax.Array, light: jax.Array) -> jax.Array:
-    """Mean brightness of the usable pixels; 1 if there is no light, where any scale will do."""
     mean = light / jnp.maximum(count, 1e-12)
-    return jnp.where(mean > 0, mean, 1)
+    return {"mean": jnp.where(mean > 0, mean, 1), "wanted": light}
 
 
 def fit_pilot(method: Any, parts: Parts, known: Known) -> Parts:
@@ -254,22 +249,15 @@ def fit_models(method: AdaptiveFLR, parts: Parts, known: Known) -> Parts:
     """All levels: models `(Q + 2, C, h, w)`, the last row from `floor.with_own_light`; the
     brightness that they give blocks twice as large; and, asked for, their error."""
     light, moments, count = parts["light"], parts["moments"], known["shift"].size
-    levels = levels_of(method, moments, known)
-    models = merged_models(*levels)
+    coarsest, steps = fit_levels(method, moments, known)
+    models = steps[-1].merged if steps else coarsest.coefficients
     output = energy.block_light(models, light, count)
     given = {
         "models": with_own_light(models, mean_guides(moments[:-1], count)),
         "output": output,
         "kept": jnp.stack([light[0] * output, light[0] * output**2]),
     }
-    return given | ({"block_error": block_error(*levels)} if method.tells_error else {})
-
-
-def levels_of(method: AdaptiveFLR, moments: jax.Array, known: Known) -> tuple[Fit, list[Step]]:
-    """`fit_levels`, from the weighted moments and one plane of their noise."""
-    grid, shift = Grid(moments[:-1], moments[-1:], method.finest), known["shift"]
-    channels = channels_of(grid.moments, shift.size)
-    return fit_levels(grid, shift, channels, known["mean"], method)
+    return given | ({"block_error": block_error(coarsest, steps)} if method.tells_error else {})
 
 
 def learn_rate(method: Any, known: Known, sums: Parts) -> Known:

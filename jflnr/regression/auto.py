@@ -19,12 +19,12 @@ from jflnr.checks import one_sentence
 from jflnr.frame import Frame
 from jflnr.images.inputs import prepare
 from jflnr.lazy import jax, jit, jnp, pytree
-from jflnr.regression.adaptive import AdaptiveFLR, counted, levels_of, weight_of
+from jflnr.regression.adaptive import AdaptiveFLR, counted, weight_of
 from jflnr.regression.division import divide
 from jflnr.regression.level import brightness, mean_guides, predict
 from jflnr.regression.moments import channels_of, collect, index_xx, index_xy
-from jflnr.regression.multiscale import TILE, in_tiles
-from jflnr.regression.resampling import double, halve
+from jflnr.regression.multiscale import TILE, fit_levels
+from jflnr.regression.resampling import double, halve, halve_inside
 from jflnr.stages import Known, Parts, Stage, run
 
 
@@ -69,7 +69,8 @@ def signal_in_tiles(
 def _signal(method: AdaptiveFLR, frame: Frame, names: tuple[str, ...]) -> jax.Array:
     images = method.images(frame, names)
     parts, known = run(method.stages()[:3], method, images, method.known(images))
-    return in_tiles(levels_of(method, parts["moments"], known)[1][-2].share)
+    _, steps = fit_levels(method, parts["moments"], known)
+    return halve_inside(steps[-2].share)
 
 
 def collect_blocks(method: Auto, parts: Parts, known: Known) -> Parts:

@@ -7,7 +7,7 @@ the ones before it already explain: that guide's slope is 0.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, TypeAlias
 
 from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.division import divide
@@ -55,45 +55,6 @@ def eliminate(matrix: jax.Array, right: jax.Array) -> jax.Array:
 
     both = jnp.concatenate([matrix, right], axis=1)
     return lax.fori_loop(0, count, step, both)[:, count:]
-
-
-class Factored(NamedTuple):
-    """`matrix = L D L^T`: 1 / D `(Q, h, w)`, D L^T `(Q, Q, h, w)` and L^-1 right `(Q, C, h, w)`."""
-
-    inverse: jax.Array
-    upper: jax.Array
-    right: jax.Array
-
-
-def factor(matrix: jax.Array, right: jax.Array) -> Factored:
-    """The first half of `cholesky_solve`, in a loop; arguments as there, Q > 0."""
-    count = matrix.shape[0]
-    number = jnp.arange(count)[:, None, None]
-
-    def step(k: jax.Array, state: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        system, inverses = state
-        row, column = system[k], system[:, k]
-        inverse = inverse_pivot(row[k])
-        share = jnp.where(number > k, column * inverse, 0)
-        return system - share[:, None] * row, inverses.at[k].set(inverse)
-
-    both = jnp.concatenate([matrix, right], axis=1)
-    both, inverse = lax.fori_loop(0, count, step, (both, jnp.zeros_like(matrix[:, 0])))
-    return Factored(inverse, both[:, :count], both[:, count:])
-
-
-def substitute(system: Factored, shares: jax.Array) -> jax.Array:
-    """The second half, with `shares` `(Q, h, w)` of L^-1 right. Returns `(Q, C, h, w)`."""
-    count = system.inverse.shape[0]
-    later = jnp.arange(count)[:, None, None]
-
-    def step(i: jax.Array, solution: jax.Array) -> jax.Array:
-        k = count - 1 - i
-        row = jnp.where(later > k, system.upper[k], 0)
-        known = jnp.sum(row[:, None] * solution, axis=0)
-        return solution.at[k].set((shares[k] * system.right[k] - known) * system.inverse[k])
-
-    return lax.fori_loop(0, count, step, jnp.zeros_like(system.right))
 
 
 def cholesky_solve(matrix: jax.Array, right: jax.Array) -> jax.Array:
@@ -152,7 +113,4 @@ def _product(a: jax.Array, b: jax.Array) -> jax.Array:
     return jnp.sum(a[:, :, None] * b, axis=1)
 
 
-SOLVERS: dict[str, Solve] = {
-    "cholesky": cholesky_solve,
-    "block-inverse": block_inverse_solve,
-}
+SOLVERS: dict[str, Solve] = {"cholesky": cholesky_solve, "block-inverse": block_inverse_solve}

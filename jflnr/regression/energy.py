@@ -5,7 +5,7 @@ from __future__ import annotations
 from jflnr.lazy import jax, jnp
 from jflnr.regression.division import divide
 from jflnr.regression.level import mean_guides, predict
-from jflnr.regression.resampling import halve
+from jflnr.regression.resampling import halve_inside
 
 
 def block_light(coefficients: jax.Array, moments: jax.Array, guides: int) -> jax.Array:
@@ -14,9 +14,7 @@ def block_light(coefficients: jax.Array, moments: jax.Array, guides: int) -> jax
     coefficients: `(Q + 1, C, h, w)`. moments: unweighted, of the brightness alone, at half the
     resolution.
     """
-    whole = halve(jnp.ones((1, *coefficients.shape[2:]), coefficients.dtype))
-    pooled = halve(coefficients.reshape(-1, *coefficients.shape[2:])) / whole
-    pooled = pooled.reshape(*coefficients.shape[:2], *whole.shape[1:])
+    pooled = halve_inside(coefficients)
     return jnp.maximum(predict(pooled, mean_guides(moments, guides)), 0)
 
 

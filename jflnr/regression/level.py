@@ -102,13 +102,11 @@ def fit_level(
     if features is None:
         features = guide_features(grid, guides, numbers)
     window = window_over(features, numbers.sigma)
-    moments = (
-        gather_moments(
-            grid.moments, window, numbers.sigma, guides, channels, numbers.position_ridge
-        )
-        if slopes
-        else gather(grid.moments, window)
-    )
+    if slopes:
+        given = window, numbers.sigma, guides, channels, numbers.position_ridge
+        moments = gather_moments(grid.moments, *given)
+    else:
+        moments = gather(grid.moments, window)
     n = jnp.maximum(moments[0], 1e-12)
     # The square of n and, in derivatives, the square of that would be too small for float32.
     inverse = 1 / (n * grid.block)

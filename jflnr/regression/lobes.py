@@ -7,11 +7,10 @@ coarsely by itself; the fits tell what share of the denoised light is the pass's
 from __future__ import annotations
 
 from jflnr.lazy import jax, jnp, lax
-from jflnr.regression.adaptive import AdaptiveFLR, flr_adaptive
+from jflnr.regression.adaptive import flr_adaptive
+from jflnr.regression.division import divide
 from jflnr.regression.moments import Guides
 
-# Passes go with their own colours, so that shares vary slowly.
-COARSE = AdaptiveFLR()
 # Darker colours are not divided by.
 LEAST_COLOUR = 0.02
 # Passes that lack less of the light are complete, but for rounding.
@@ -42,12 +41,13 @@ def split(
     rest = jnp.where(jnp.nansum(rest) > LACKING * jnp.nansum(noisy), rest, 0)
     parts = (radiance / jnp.maximum(clean, LEAST_COLOUR)).reshape(*size, -1, 3)
     targets = jnp.moveaxis(jnp.concatenate([parts, rest[:, :, None]], axis=2), 2, 0)
-    fits = lax.map(lambda part: flr_adaptive(part, guides, COARSE, weight=weight), targets)
+    # Passes go with their own colours, so that shares vary slowly: coarse fits will do.
+    fits = lax.map(lambda part: flr_adaptive(part, guides, weight=weight), targets)
     fits = jnp.moveaxis(jnp.maximum(fits, 0), 0, 2)
     # Where no fit has light but the picture has, it is divided by colour.
     expected = fits[:, :, :-1].reshape(radiance.shape) * clean + 1e-6 * clean * jnp.mean(reflected)
     total = jnp.sum(expected, axis=(2, 3)) + fits[:, :, -1]
-    each = jnp.where(total > 0, reflected / jnp.where(total > 0, total, 1), 0)
+    each = divide(reflected, total)
     split = expected * each[:, :, None, None] / jnp.where(clean > 0, clean, 1)
     left = jnp.maximum(reflected - jnp.sum(split * clean, axis=(2, 3)), 0)
     return split.reshape(passes.shape), left

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from jflnr.lazy import jax, jnp
 from jflnr.regression.level import Fit, Grid, fit_level, guide_features, mean_guides, predict
 from jflnr.regression.merge import signal_share
-from jflnr.regression.resampling import double, double_all, halve
+from jflnr.regression.moments import channels_of
+from jflnr.regression.resampling import double, double_all, halve_inside
+from jflnr.stages import Known
 
 if TYPE_CHECKING:
     from jflnr.regression.adaptive import AdaptiveFLR
@@ -31,45 +33,39 @@ class Step(NamedTuple):
     merged: jax.Array
 
 
-def merged_models(coarsest: Fit, steps: list[Step]) -> jax.Array:
-    """Models of the finest grid, put together from all levels: `(Q + 1, C, h, w)`."""
-    return steps[-1].merged if steps else coarsest.coefficients
+def fit_levels(numbers: AdaptiveFLR, moments: jax.Array, known: Known) -> tuple[Fit, list[Step]]:
+    """The fit of the coarsest grid, and the steps from there to the finest.
 
-
-def fit_levels(
-    grid: Grid, shift: jax.Array, channels: int, mean: jax.Array, numbers: AdaptiveFLR
-) -> tuple[Fit, list[Step]]:
-    """The fit of the coarsest grid, and the steps from there to the finest."""
-    *finer, coarsest = grid.pyramid(numbers.levels)
+    moments: weighted, of the finest blocks, and as the last plane their noise.
+    """
+    shift, mean = known["shift"], known["mean"]
+    finest = Grid(moments[:-1], moments[-1:], numbers.finest)
+    channels = channels_of(finest.moments, shift.size)
+    *finer, coarsest = finest.pyramid(numbers.levels)
     first = fit_level(coarsest, shift, channels, mean, numbers)
     coarse, merged, steps = first, first.coefficients, list[Step]()
     for grid in reversed(finer):
-        size, window, finest = grid.moments.shape[1:], coarse.window, grid is finer[0]
-        known = coarse.coefficients, merged, coarse.variance
-        coefficients, merged, variance = double_all(known, *size)
-        coarse = Fit(coefficients, variance, window)
+        size = grid.moments.shape[1:]
+        so_far = coarse.coefficients, merged, coarse.variance
+        coefficients, merged, variance = double_all(so_far, *size)
+        coarse = Fit(coefficients, variance, coarse.window)
         luminance = jnp.maximum(predict(merged, mean_guides(grid.moments, shift.size)), 0)
         # Windows end where what is known so far of the brightness changes.
         edge = numbers.brightness_scale * jnp.log(luminance / mean + 0.1)
         features = jnp.concatenate([guide_features(grid, shift.size, numbers), edge[None]])
         # Windows of the finest blocks are so narrow that slopes across them are hardly worth
         # their time.
-        fine = fit_level(grid, shift, channels, mean, numbers, features, slopes=not finest)
-        if finest and steps and numbers.worth is not None:
+        fine = fit_level(grid, shift, channels, mean, numbers, features, slopes=grid is not finest)
+        if grid is finest and steps and numbers.worth is not None:
             where = chosen(steps[-1].share, numbers.worth, *size)
             models = jnp.where(where, fine.coefficients, coarse.coefficients)
             fine = Fit(models, jnp.where(where, fine.variance, coarse.variance), fine.window)
         reference = luminance**2 + 0.01 * mean**2 + 1e-30
-        share = signal_share(grid, fine, coarse, window, reference, numbers.caution)
+        share = signal_share(grid, fine, coarse, reference, numbers.caution)
         merged = merged + double(share, *size) * (fine.coefficients - coarse.coefficients)
         steps.append(Step(grid, fine, coarse, share, merged))
         coarse = fine
     return first, steps
-
-
-def in_tiles(share: jax.Array) -> jax.Array:
-    """Means over the tiles of the share of signal in the step before the finest, `(h, w)`."""
-    return (halve(share[None]) / halve(jnp.ones_like(share)[None]))[0]
 
 
 def chosen(share: jax.Array, worth: jax.Array | float, height: int, width: int) -> jax.Array:
@@ -78,5 +74,5 @@ def chosen(share: jax.Array, worth: jax.Array | float, height: int, width: int) 
     Those are all where more than `worth` of what the step before added was signal: where that was
     noise, what is finer still is noise too. share: of that step.
     """
-    where = in_tiles(share) > worth
+    where = halve_inside(share) > worth
     return jnp.repeat(jnp.repeat(where, TILE, 0), TILE, 1)[:height, :width]

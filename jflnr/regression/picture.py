@@ -24,13 +24,7 @@ from jflnr.lazy import jax, jit, jnp, pytree
 from jflnr.regression.adaptive import AdaptiveFLR, light_of
 from jflnr.regression.detail import BLOCK as DETAIL_BLOCK
 from jflnr.regression.detail import REACH, find_detail
-from jflnr.regression.features import (
-    FARTHEST,
-    SAMPLES,
-    combine,
-    coverage,
-    filter_features,
-)
+from jflnr.regression.features import FARTHEST, SAMPLES, combine, coverage, filter_features
 from jflnr.regression.lobes import split
 from jflnr.stages import Known, Parts, Stage, regress
 
@@ -142,18 +136,18 @@ def images_of(picture: Picture, clean: Picture, samples: Array, unit: Array, lit
     guiding = clean._replace(albedo=xp.clip(clean.albedo, 0, 1))
     layers = [getattr(guiding, name) for name in GUIDES]
     guides = tuple(layer for layer in layers if layer is not None)
+    noisy, film = picture.alpha, clean.alpha
+    if noisy is not None and film is not None:
+        film = own_cover(noisy, film, samples)
     images = {"target": light, "guides": guides, "guides_map": None, "weight": weight}
     images |= {"surface": surface, "own": own_light(clean), "alpha": clean.alpha}
-    images |= {"beauty": picture.beauty, "film": None}
-    if picture.alpha is not None and clean.alpha is not None:
-        images["film"] = own_cover(picture.alpha, clean.alpha, samples)
-    # By rows, as parts of a frame are.
-    images |= {"brightness": xp.broadcast_to(unit, (len(light), 1, 1))}
+    # The brightness by rows, as parts of a frame are.
+    rows = xp.broadcast_to(unit, (len(light), 1, 1))
+    images |= {"beauty": picture.beauty, "film": film, "brightness": rows}
     if picture.colours is None:
         return images
-    for name, shining in (("own_noisy", picture), ("own_clean", clean)):
-        own = (shining.emission, shining.environment)
-        images[name] = tuple(light_in(picture, layer) for layer in own)
+    for name, own in (("own_noisy", picture), ("own_clean", clean)):
+        images[name] = tuple(light_in(own, layer) for layer in (own.emission, own.environment))
     return images | {"colours": (picture.colours, clean.colours)}
 
 
@@ -316,19 +310,11 @@ def picture_in(frame: Frame, scene: Scene) -> Picture:
     position = frame.position
     if position is not None:
         position = xp.where(there, (position - scene.middle) * scale, 0)
-    layers = {
-        "beauty": frame.beauty,
-        "albedo": frame.seen_albedo,
-        "normal": frame.normal,
-        "seen_normal": frame.seen_normal,
-        "depth": depth,
-        "position": position,
-        "emission": frame.emitted,
-        "environment": frame.environment,
-        "alpha": frame.alpha,
-        "colours": frame.lobe_colours,
-    }
-    return Picture(**layers)
+    layers: dict[str, Any]
+    layers = {"beauty": frame.beauty, "albedo": frame.seen_albedo, "normal": frame.normal}
+    layers |= {"seen_normal": frame.seen_normal, "depth": depth, "position": position}
+    layers |= {"emission": frame.emitted, "environment": frame.environment}
+    return Picture(**layers, alpha=frame.alpha, colours=frame.lobe_colours)
 
 
 def own_light(picture: Picture) -> Array:

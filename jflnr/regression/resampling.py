@@ -20,6 +20,13 @@ def halve(planes: jax.Array) -> jax.Array:
     return jnp.mean(planes.reshape(count, height, 2, width, 2), axis=(2, 4))
 
 
+def halve_inside(planes: jax.Array) -> jax.Array:
+    """Mean of those of 2 x 2 blocks inside the border: `(..., h, w)` likewise."""
+    whole = halve(jnp.ones((1, *planes.shape[-2:]), planes.dtype))
+    means = halve(planes.reshape(-1, *planes.shape[-2:])) / whole
+    return means.reshape(*planes.shape[:-2], *whole.shape[1:])
+
+
 def double(planes: jax.Array, height: int, width: int) -> jax.Array:
     """Bilinear interpolation between block centres, clamped: `(..., h, w)` to `(..., 2h, 2w)`.
 

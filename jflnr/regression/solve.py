@@ -10,11 +10,13 @@ from jflnr.lazy import jax, jnp, lax
 from jflnr.regression.division import divide
 from jflnr.regression.elimination import SOLVERS, Solver, by_its_equation, eliminate
 from jflnr.regression.moments import index_xx, index_xy
-from jflnr.regression.strips import map_rows
+from jflnr.regression.strips import cut, fill
 
 # Roundings that a variance, a difference of two sums, may be off by: of plain windows, and of
 # edge-aware ones, which may lie far from the shift and hold few blocks.
 ROUNDING, ROUNDING_OF_STRIPS = 8, 64
+# Blocks of a grid that are worked on at a time, about.
+TOGETHER = 4096
 
 
 class NormalEquations(NamedTuple):
@@ -114,10 +116,12 @@ def solve_strips(
     compiles in a fraction of the time that a factorisation written out takes.
     """
 
-    def solve_some(strip: tuple[jax.Array, jax.Array, jax.Array]) -> jax.Array:
-        moments, eps, eps_prime = strip
-        system = normal_equations(moments, shift, eps, eps_prime, channels, ROUNDING_OF_STRIPS)
+    def strip(first: jax.Array | int, rows: int) -> jax.Array:
+        given = cut((moments, eps, eps_prime), first, rows, axis=-2)
+        planes, own, own_prime = lax.optimization_barrier(given)
+        system = normal_equations(planes, shift, own, own_prime, channels, ROUNDING_OF_STRIPS)
         return system.models(by_its_equation(eliminate, system.correlation, system.right))
 
-    lead = shift.size + 1, channels
-    return map_rows(solve_some, (moments, eps, eps_prime), lead)
+    height, width = moments.shape[1:]
+    models = jnp.zeros((shift.size + 1, channels, height, width), moments.dtype)
+    return fill(models, 2, height, 1, max(TOGETHER // width, 1), strip)

@@ -9,8 +9,6 @@ from jflnr.lazy import jax, jnp, lax
 
 # Rows of pixels that are worked on at a time: enough to keep cores busy.
 ROWS = 16
-# Blocks of a grid that are worked on at a time, about.
-TOGETHER = 4096
 
 
 def step_of(block: int, rows: int = ROWS) -> int:
@@ -52,26 +50,6 @@ def fill(
     return add(end, array, height - end) if end < height else array
 
 
-def cut(images: Any, first: jax.Array | int, rows: int) -> Any:
-    """Some rows of every image `(H, W, ...)` of a pytree."""
-    return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows), images)
-
-
-def map_rows(make: Callable[[Any], jax.Array], planes: Any, lead: tuple[int, ...]) -> jax.Array:
-    """`make` of a few rows of a grid of blocks at a time, `(*lead, h, w)`.
-
-    planes: pytree of `(..., h, w)`, of which `make` takes some rows and returns `(*lead, rows, w)`.
-    """
-    arrays = jax.tree.leaves(planes)
-    height, width = arrays[0].shape[-2:]
-    rows = min(max(TOGETHER // width, 1), height)
-
-    def add(strip: jax.Array, whole: jax.Array) -> jax.Array:
-        # The last strip ends with the grid; what it shares with the one before is the same.
-        first = jnp.minimum(strip * rows, height - rows)
-        cut = lambda a: lax.dynamic_slice_in_dim(a, first, rows, a.ndim - 2)
-        made = make(lax.optimization_barrier(jax.tree.map(cut, planes)))
-        return lax.dynamic_update_slice_in_dim(whole, made, first, whole.ndim - 2)
-
-    empty = jnp.zeros((*lead, height, width), arrays[0].dtype)
-    return lax.fori_loop(0, -(-height // rows), add, empty)
+def cut(images: Any, first: jax.Array | int, rows: int, axis: int = 0) -> Any:
+    """Some rows of every image `(H, W, ...)` of a pytree, or along another axis."""
+    return jax.tree.map(lambda image: lax.dynamic_slice_in_dim(image, first, rows, axis), images)

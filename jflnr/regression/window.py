@@ -77,7 +77,7 @@ def gather_moments(
     mean squares of x and of y.
     Returns the planes of Q + 2 guides, in the order of `moments.py`.
     """
-    xx = (guides + 1) * (guides + 2) // 2
+    xx = index_xy(0, 0, guides, channels)
     first = np.array(
         [index_xx(i, 0) for i in range(guides + 1)]
         + [index_xy(0, c, guides, channels) for c in range(channels)]
