@@ -24,7 +24,7 @@ from jflnr.files import write_atomically
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "results"
-PACKAGES = ("jax", "numpy", "pyopencl", "pocl-binary-distribution", "pyoidn", "mitsuba")
+PACKAGES = ("jax", "jaxopt", "numpy", "pyopencl", "pocl-binary-distribution", "pyoidn", "mitsuba")
 # What figures depend on, of the package.
 CODE = ("jflnr/*.py", "jflnr/*.npz", "kernels_cl")
 

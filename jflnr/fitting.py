@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import jaxopt
 import numpy as np
-from scipy.optimize import minimize
 
 from jflnr import checks
 from jflnr.frame import Array, Frame
@@ -87,27 +87,29 @@ def fit(
     examples = [prepare(method, frame, choose(frame, names)) for frame in frames]
     values: list[float] = []
 
-    def mean_loss(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
+    def mean_loss(logarithms: jax.Array) -> tuple[jax.Array, jax.Array]:
         # One frame at a time: memory for one, and one program for all frames of a size.
-        losses = [_value_and_grad(method, jnp.float32(logarithms), example) for example in examples]
+        losses = [_value_and_grad(method, logarithms, example) for example in examples]
         value, slope = (sum(some) / len(some) for some in zip(*losses, strict=True))
         values.append(float(value))
-        return values[-1], np.asarray(slope, np.float64)
+        return value, slope
 
     done = itertools.count(1)
-    # Every real value of a logarithm is a valid model.
-    found = minimize(
-        mean_loss,
-        np.float64(jnp.log(jnp.float32(jax.tree.leaves(method)))),
-        jac=True,
+    # Its search along lines never ends above its start, unlike that of `jaxopt.LBFGS`.
+    solver = jaxopt.ScipyMinimize(
+        fun=mean_loss,
+        value_and_grad=True,
+        jit=False,
         method="L-BFGS-B",
+        maxiter=steps,
         callback=lambda _: progress(next(done), min(values)) if progress else None,
-        options={"maxiter": steps},
     )
-    fitted = jax.tree.map(float, _with(method, jnp.float32(found.x)))
+    # Every real value of a logarithm is a valid model.
+    logarithms, info = solver.run(jnp.log(jnp.float32(jax.tree.leaves(method))))
+    fitted = jax.tree.map(float, _with(method, logarithms))
     if isinstance(fitted, FLR):
         fitted = dataclasses.replace(fitted, support=None)
-    return Fit(fitted, values[0], float(found.fun), int(found.nit))
+    return Fit(fitted, values[0], float(info.fun_val), int(info.iter_num))
 
 
 def _with(method: Any, logarithms: jax.Array) -> Any:

@@ -15,6 +15,8 @@ from jflnr.methods import BACKENDS
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # jaxopt says on import that it is no longer developed; we pin its last release knowingly.
+    config.addinivalue_line("filterwarnings", "ignore:JAXopt is no longer:DeprecationWarning")
     # Tests wait for the compiler, not for what it makes; so do the processes that they start.
     quick = f"--xla_backend_optimization_level=0 {quickly()}"
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}"
