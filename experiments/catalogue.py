@@ -28,6 +28,7 @@ NAMES = (
     "sequences",
     "bmfr",
     "whole",
+    "materials",
     "first_picture",
     "threads",
 )

@@ -16,6 +16,7 @@ import jflnr
 from experiments import data
 from experiments.methods import oidn_peers
 from experiments.peers import svgf
+from jflnr import temporal
 from jflnr.bmfr.pipeline import BMFR
 from jflnr.cli.jobs import expand
 from jflnr.frame import Array, Frame
@@ -129,10 +130,11 @@ def of_averages(
     """Frame by frame, of the noisy light as a history of ours has averaged it."""
 
     def run(frames: Sequence[Frame]) -> list[np.ndarray]:
-        denoiser, lights = jflnr.Denoiser("flr"), []
+        state: Any = temporal.start(frames[0], "flr")
+        lights = []
         for frame in frames:
-            denoiser.next(frame)
-            average = np.asarray(denoiser.state.light.mean)
+            state, _ = temporal.step(state, frame, "flr")
+            average = np.asarray(state.light.mean)
             lights.append(np.asarray(denoise(dataclasses.replace(frame, indirect=average))))
         return lights
 

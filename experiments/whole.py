@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 import jflnr
-from experiments import data, plots, results
+from experiments import data
 from experiments.peers import oidn
 from experiments.timing import interleaved
 from jflnr.exr import read_channels
@@ -205,21 +205,3 @@ def metrics(image: Array, first: np.ndarray, second: np.ndarray) -> dict[str, fl
         "ssim": ssim(ours, wanted),
         "flip": flip(ours, wanted),
     }
-
-
-def draw(result: dict[str, Any], folder: Path) -> None:
-    """A table of PSNR per picture, with SSIM and FLIP of ours with the network and the best."""
-    columns = {
-        "spp": "spp",
-        "picture": "picture",
-        "noisy_psnr": "noisy, dB",
-        "ours_psnr": "picture",
-        "flnr_psnr": "flnr-picture",
-        "raw_psnr": "OIDN",
-        "clean_psnr": "OIDN, auxiliaries prefiltered",
-        "flnr_ssim": "SSIM, flnr-picture",
-        "clean_ssim": "OIDN",
-        "flnr_flip": "FLIP, flnr-picture",
-        "clean_flip": "OIDN",
-    }
-    plots.write_text(folder / f"{NAME}.md", results.table(result["pictures"], columns))

@@ -20,7 +20,7 @@ from experiments.rendering.source import Source
 from experiments.rendering.tracer import Tracer
 from jflnr.camera import Camera
 
-NOISY = (1, 1, 1, 1, 4, 4, 16, 16)
+NOISY = (1, 1, 1, 1, 4, 4, 16, 16, 64)
 HALF = 48  # samples per pixel of each half of the reference
 PROBE = (64, 36)
 BRIGHTNESS = 0.35  # mean of a picture, as DESIGN.md exposes

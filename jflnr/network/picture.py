@@ -23,6 +23,7 @@ from jflnr.regression.features import blur
 from jflnr.regression.picture import (
     EVERYTHING,
     GUIDES,
+    LEAST_ALBEDO,
     QUIETLY,
     WholePicture,
     composed,
@@ -34,9 +35,11 @@ from jflnr.regression.picture import (
 from jflnr.stages import Known, Parts, Stage
 
 # The network has seen no means of more.
-MOST_SAMPLES = 32
+MOST_SAMPLES = 64
 # Pixels between which light is lent, and the luminance that is too little to be.
 NEAR, LEAST_LIGHT = 3, 1e-3
+# Of what a surface reflects, the most that is put down to the texture that was taken from it.
+MOST_TEXTURE = 4
 
 
 class Read(NamedTuple):
@@ -51,7 +54,7 @@ class Read(NamedTuple):
 
     # As of `features.Read`.
     PIXEL = 27  # type: ignore[misc]
-    SAID = 6  # type: ignore[misc]
+    SAID = 7  # type: ignore[misc]
     GUIDES = WholePicture.guides  # type: ignore[misc]
     LAYER, COVER = "beauty", "alpha"  # type: ignore[misc]
     OF_NOISE = (  # type: ignore[misc]
@@ -98,15 +101,17 @@ class Read(NamedTuple):
         return jnp.concatenate(planes, axis=-1)
 
     def corrected(self, said: jax.Array) -> jax.Array:
-        """The picture `(H, W, 3)` by what the network says of it, `(H, W, 6)`.
+        """The picture `(H, W, 3)` by what the network says of it, `(H, W, 7)`.
 
         Factors on its light: what is dark may brighten where something covers it. How much it takes
-        of what is left of the noisy picture, at the pixel and as a mean of those around; and of
-        what shines near it, which wires thinner than a pixel need where no sample met them, and the
-        less the more samples did not.
+        of what is left of the noisy picture, at the pixel and as a mean of those around; of what
+        shines near it, which wires thinner than a pixel need where no sample met them, and the less
+        the more samples did not; and of what the light would be with the albedo that was taken for
+        noise.
         """
         dark, left = DARK * self.alpha, self.left()
-        offered = left, _blurred(left), self.shining() / jnp.maximum(self.samples, 1)
+        lent = self.shining() / jnp.maximum(self.samples, 1)
+        offered = left, _blurred(left), lent, self.textured()
         shares = jnp.split(jnp.tanh(said[..., COLOURS:]), len(offered), axis=-1)
         taken = sum(share * image for share, image in zip(shares, offered, strict=True))
         gains = factors(said[..., :COLOURS])
@@ -119,6 +124,11 @@ class Read(NamedTuple):
         for _ in range(NEAR):
             sums = _blurred(sums)
         return sums[..., :COLOURS] / (sums[..., COLOURS:] + LEAST_LIGHT)
+
+    def textured(self) -> jax.Array:
+        """What the light lacks if the albedo's noise is its texture, `(H, W, 3)`."""
+        taken = self.albedo_left / jnp.maximum(self.albedo, LEAST_ALBEDO)
+        return jnp.maximum(self.light - self.own, 0) * jnp.clip(taken, -1, MOST_TEXTURE)
 
     def left(self) -> jax.Array:
         """What is left of the noisy picture, `(H, W, 3)`; fireflies are no brighter than that."""

@@ -25,7 +25,7 @@ from jflnr.network.examples import Example, before_network, draw
 WIDTHS = {
     "flnr-small": (10, 16, 24, 32),
     "flnr": (20, 32, 56, 80),
-    "flnr-picture": (40, 64, 112, 160),
+    "flnr-picture": (64, 80, 112, 160),
 }
 # Samples per pixel that are validated.
 COUNTS = (1, 4, 16)

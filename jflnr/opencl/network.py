@@ -92,8 +92,11 @@ def correct_picture(context: Context, params: unet.Params, read: picture.Read) -
     around = blurred(context, left, lanes)
     for _ in range(picture.NEAR):
         shining = blurred(context, shining, lanes)
-    others = named["alpha"], named["samples"], left, around, shining
-    written = {"PICTURE": 1, "LEAST_LIGHT": f"{picture.LEAST_LIGHT}f"} | DARK
+    read_again = ("alpha", "samples", "own", "albedo", "albedo_left")
+    others = *(named[name] for name in read_again), left, around, shining
+    least = {"LEAST_LIGHT": picture.LEAST_LIGHT, "LEAST_ALBEDO": picture.LEAST_ALBEDO}
+    written = {"PICTURE": 1, "MOST_TEXTURE": picture.MOST_TEXTURE} | DARK
+    written |= {name: f"{value}f" for name, value in least.items()}
     _write(context, said, others, named["light"], output, written)
     return context.finish(output, result)
 

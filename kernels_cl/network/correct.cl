@@ -4,7 +4,8 @@
 // Defines beside those of the headers, with Q = 0: SAID, how many values it says of a pixel; LARGEST,
 // the logarithm of the largest factor. For light COUNTS, the channels of the map of what was read,
 // and PIXEL of them for each pixel, whose number MASK is 1 where it counts; for whole pictures
-// PICTURE, DARK, as in features.cl, and LEAST_LIGHT, the luminance that is too little to be lent.
+// PICTURE, DARK, as in features.cl, LEAST_LIGHT, the luminance that is too little to be lent, and
+// LEAST_ALBEDO and MOST_TEXTURE, as in jflnr/network/picture.py.
 
 #include "vectors.h"
 #include "sizes.h"
@@ -39,15 +40,17 @@ INLINE real factor(real said)
 
 #ifdef PICTURE
 #define OTHERS                                                                                      \
-    global const float *alpha, global const float *samples, global const float *left,              \
+    global const float *alpha, global const float *samples, global const float *own,               \
+        global const float *albedo, global const float *albedo_left, global const float *left,      \
         global const float *around, global const float *shining
 #else
 #define OTHERS global const float *read
 #endif
 
 // said: a map of 4 SAID channels over h x w blocks of 2 x 2 pixels, read: that of what was read, as
-// wide. light, output: (H, W, C) in float, alpha, samples: (H, W), left, around: (3, H, W), shining: (4, H, W),
-// as left.cl wrote it, blurred. Global size ((pitch - MARGIN) / WIDTH, h).
+// wide. light, output, own, albedo, albedo_left: (H, W, C) in float, alpha, samples: (H, W), left,
+// around: (3, H, W), shining: (4, H, W), as left.cl wrote it, blurred. Global size
+// ((pitch - MARGIN) / WIDTH, h).
 kernel void correct(
     int width, int height, int h, int w, int pitch, global const float *said, OTHERS,
     global const float *light, global float *output)
@@ -81,15 +84,15 @@ kernel void correct(
             const long pixel = (long)(2 * y + dy) * width + x0;
             real values[C];
 #ifdef PICTURE
-            const real of_left = part == 0 ? FIRST_OF(even[3], odd[3]) : SECOND_OF(even[3], odd[3]);
-            const real of_around =
-                part == 0 ? FIRST_OF(even[4], odd[4]) : SECOND_OF(even[4], odd[4]);
+            real shares[SAID];
+#pragma unroll
+            for (int c = 3; c < SAID; ++c)
+                shares[c] = part == 0 ? FIRST_OF(even[c], odd[c]) : SECOND_OF(even[c], odd[c]);
             const real dark = DARK * guide_lanes(alpha + pixel, 1, 0, 0, last);
             const long plane = (long)height * width, row = (long)(2 * y + dy) * width;
             const real bright = lanes_at(shining + 3 * plane + row, width, x0) + LEAST_LIGHT;
             const real many = MAX(guide_lanes(samples + pixel, 1, 0, 0, last), 1);
-            const real lent =
-                (part == 0 ? FIRST_OF(even[5], odd[5]) : SECOND_OF(even[5], odd[5])) / bright / many;
+            const real lent = shares[5] / bright / many;
 #endif
 #pragma unroll
             for (int c = 0; c < C; ++c) {
@@ -98,9 +101,14 @@ kernel void correct(
                 const real before = guide_lanes(light + pixel * C, C, c, 0, last);
 #ifdef PICTURE
                 const long here = c * plane + row;
-                const real taken = of_left * lanes_at(left + here, width, x0) +
-                                   of_around * lanes_at(around + here, width, x0) +
-                                   lent * lanes_at(shining + here, width, x0);
+                const real colour = guide_lanes(albedo + pixel * C, C, c, 0, last);
+                const real texture = guide_lanes(albedo_left + pixel * C, C, c, 0, last);
+                const real lit = MAX(before - guide_lanes(own + pixel * C, C, c, 0, last), 0);
+                const real lacks =
+                    lit * CLAMP(texture / MAX(colour, LEAST_ALBEDO), -1, MOST_TEXTURE);
+                const real taken = shares[3] * lanes_at(left + here, width, x0) +
+                                   shares[4] * lanes_at(around + here, width, x0) +
+                                   lent * lanes_at(shining + here, width, x0) + shares[6] * lacks;
                 values[c] = MAX((before + dark) * gain - dark + taken, 0);
 #else
                 values[c] = gain * before;

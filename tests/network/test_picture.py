@@ -149,10 +149,12 @@ def test_light_passes_sum_to_what_it_makes(corrected):
 def test_what_the_network_says_is_done_as_in_plain_numpy():
     random, size = np.random.default_rng(4), (9, 14)
     light, noisy = random.exponential(size=(2, *size, 3))
+    own, albedo = 0.3 * light, random.random((*size, 3)) ** 4
+    albedo_left = random.uniform(-1, 1, (*size, 3)) * 0.1
     alpha, weight = random.random((2, *size, 1))
     weight *= random.random((*size, 1)) > 0.2
     samples = random.uniform(0.5, 30, (*size, 1))
-    said = 2 * random.standard_normal((*size, 6))
+    said = 2 * random.standard_normal((*size, 7))
     colour = [0.2126, 0.7152, 0.0722]
     bright = [(image @ colour)[..., None] for image in (light, noisy)]
     share = weight * np.minimum(1, (4 * bright[0] + 0.1) / bright[1])
@@ -161,14 +163,15 @@ def test_what_the_network_says_is_done_as_in_plain_numpy():
     blur = lambda image: scipy.ndimage.correlate(image, kernel, mode="nearest")
     near, all_near = (blur(blur(blur(x))) for x in (light * bright[0], bright[0]))
     gains = np.exp(1.5 * np.tanh(said[..., :3] / 1.5))
-    shares = np.split(np.tanh(said[..., 3:]), 3, axis=-1)
-    offered = left, blur(left), near / (all_near + 1e-3) / np.maximum(samples, 1)
+    shares = np.split(np.tanh(said[..., 3:]), 4, axis=-1)
+    texture = 0.7 * light * np.clip(albedo_left / np.maximum(albedo, 0.02), -1, 4)
+    offered = left, blur(left), near / (all_near + 1e-3) / np.maximum(samples, 1), texture
     taken = sum(share * image for share, image in zip(shares, offered, strict=True))
     expected = np.maximum((light + 0.02 * alpha) * gains - 0.02 * alpha + taken, 0)
     with jax.enable_x64(True):
         nothing = dict.fromkeys(Read._fields, jnp.zeros((*size, 1)))
         images = {"light": light, "noisy": noisy, "alpha": alpha, "weight": weight}
-        images["samples"] = samples
+        images |= {"samples": samples, "own": own, "albedo": albedo, "albedo_left": albedo_left}
         read = Read(**nothing | {name: jnp.asarray(x) for name, x in images.items()})
         np.testing.assert_allclose(read.corrected(jnp.asarray(said)), expected, rtol=1e-9)
 
