@@ -72,10 +72,9 @@ def cores() -> int:
 
 def local_cluster(count: int) -> Any:
     """Dask workers on this machine, processes of one thread each; a context manager."""
+    workers = {"n_workers": count, "threads_per_worker": 1, "memory_limit": 0}
     quiet = {"dashboard_address": ":0", "silence_logs": logging.ERROR}
-    return _distributed().LocalCluster(
-        n_workers=count, threads_per_worker=1, memory_limit=0, **quiet
-    )
+    return _distributed().LocalCluster(**workers, **quiet)
 
 
 def _distributed() -> Any:

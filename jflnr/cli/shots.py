@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import itertools
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -55,7 +56,7 @@ def records(worker: Worker, jobs: Sequence[Job], arguments: argparse.Namespace) 
         )
     if arguments.cluster is None:
         return itertools.chain.from_iterable(_denoised(worker, shot) for shot in shots)
-    whole = lambda shot: list(_denoised(worker, shot))
+    whole = functools.partial(_finished, worker)  # which travels, as no lambda does
     failed = lambda shot, error: [failure(job, error) for job in shot]
     return itertools.chain.from_iterable(cluster.each(arguments.cluster, whole, shots, failed))
 
@@ -66,6 +67,10 @@ def shots_of(jobs: Iterable[Job]) -> list[list[Job]]:
     for job in jobs:
         shots.setdefault(job.source.parent, []).append(job)
     return [sorted(shot, key=lambda job: natural(job.source)) for shot in shots.values()]
+
+
+def _finished(worker: Worker, shot: Sequence[Job]) -> list[Record]:
+    return list(_denoised(worker, shot))
 
 
 def _denoised(worker: Worker, shot: Sequence[Job]) -> Iterator[Record]:

@@ -101,8 +101,7 @@ def _report(progress: "Progress") -> None:
 
 
 def _decibels(progress: "Progress") -> str:
-    found = progress.validation.items()
-    return "".join(f", {psnr:.2f} dB at {spp} spp" for spp, psnr in found)
+    return "".join(f", {psnr:.2f} dB at {spp} spp" for spp, psnr in progress.validation.items())
 
 
 def _write(output: Path, result: "Result", settings: "Settings", paths: Sequence[Path]) -> None:
