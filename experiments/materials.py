@@ -114,7 +114,7 @@ def charts(parts: Parts, folder: Path) -> None:
             place = np.arange(len(rows)) + 0.8 * (number / len(names) - 0.5)
             left.bar(place, [row[name] for row in rows], 0.2, align="edge", label=name)
         left.set_xticks(np.arange(len(rows)), [f"{r['pixel']}\n{r['share']:.0%}" for r in rows])
-        left.set(ylabel="PSNR, dB", ylim=(10, None))
+        left.set(ylabel="PSNR, dB", ylim=(10, 38))
         left.legend(fontsize=8)
         rows = parts[BY_GUIDES]
         for mark, name in zip("osD", dict.fromkeys(row["method"] for row in rows), strict=False):
