@@ -4,6 +4,7 @@ OpenEXR's own Python module only knows whole files. Files of one part in scan li
 """
 
 import dataclasses
+import functools
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -44,7 +45,9 @@ def _opened(path: Path) -> Any:
     """The open file; OpenImageIO takes no names that are not UTF-8."""
     open_file = _openimageio().ImageInput.open
     with tempfile.TemporaryDirectory() as folder:
-        if not str(path).isprintable():
+        try:
+            str(path).encode()
+        except UnicodeEncodeError:
             link = Path(folder) / "link.exr"
             link.symlink_to(path.resolve())
             path = link
@@ -76,25 +79,30 @@ class Scanlines:
         self.layout = recognise(nothing, spp, names, path)
         if len(nothing) > len(self.channels):
             raise ValueError(f"{path}: --map to another file needs both whole: raise --memory")
-        self.opaque = self._opaque()
-        self.shares: Shares = np.zeros(0), np.zeros(0)  # while they are looked for
-        self.shares = self._shares()
 
-    def _opaque(self) -> bool:
+    def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
+        """Rows `start` to `stop` of the channels that make up these layers of a frame."""
+        return self._part(start, stop, layers, self.shares)
+
+    @functools.cached_property
+    def opaque(self) -> bool:
         """Whether the picture's alpha, if it has one, is 1 everywhere."""
         names = [name for name in self.layout.picture[3:] if name in self.channels]
         starts = range(0, self.height, BATCH) if names else ()
-        parts = (self._read(top, min(top + BATCH, self.height), names) for top in starts)
+        stops = (min(start + BATCH, self.height) for start in starts)
+        parts = (self._read(*rows, names) for rows in zip(starts, stops, strict=True))
         return all(np.all(part[name] == 1) for part in parts for name in names)
 
-    def _shares(self) -> Shares:
+    @functools.cached_property
+    def shares(self) -> Shares:
         """What tells the samples of a picture of Blender, where its header does not."""
+        nothing = np.zeros(0), np.zeros(0)
         if self.layout.program != "Blender" or told_samples(self.layout, self.attributes):
-            return self.shares
+            return nothing
         found = []
         for start in range(0, self.height, BATCH):
             stop = min(start + BATCH + AROUND, self.height)
-            images = layouts.assemble(self.part(start, stop, SHOWING))
+            images = layouts.assemble(self._part(start, stop, SHOWING, nothing))
             normal, albedo, alpha = (images[name] for name in SHOWING)
             found.append(shares_of(normal, albedo, alpha, BATCH))
         turned, others = zip(*found, strict=True)
@@ -110,15 +118,16 @@ class Scanlines:
 
         return Rows(self.height, self.width, read)
 
-    def part(self, start: int, stop: int, layers: Collection[str]) -> layouts.Source:
-        """Rows `start` to `stop` of the channels that make up these layers of a frame."""
+    def _part(
+        self, start: int, stop: int, layers: Collection[str], shares: Shares
+    ) -> layouts.Source:
         wanted = {*NEEDED, *layers}
         names = {c for n, chosen in self.layout.channels.items() if n in wanted for c in chosen}
         names |= set(self.layout.picture[3:])  # alpha, which goes on to the output
         channels = self._read(start, stop, sorted(names & set(self.channels)))
         (x, y), display = self.attributes.window
         attributes = self.attributes._replace(window=exr.Window((x, y + start), display))
-        whole = self.opaque, self.shares
+        whole = self.opaque, shares
         return layouts.Source(self.path, channels, attributes, self.layout, True, *whole)
 
     def _read(self, start: int, stop: int, names: list[str]) -> dict[str, np.ndarray]:

@@ -13,16 +13,14 @@ import numpy as np
 from jflnr.exr import layers_of
 from jflnr.layouts.channels import Layout, Lobe, in_layer
 
-# Names since Blender 5.0, then those up to 4.x. Of every lobe its colour, and the passes that are
-# divided by it; volumes have no colour.
-SHORT = {"Diffuse": "Diff", "Glossy": "Gloss", "Transmission": "Trans", "Volume": "Volume"}
-LOBES = {
-    lobe: [(f"{lobe} {part}", f"{short}{part[:3]}") for part in ("Color", "Direct", "Indirect")]
-    for lobe, short in SHORT.items()
-}
-PASSES = dict(zip(("indirect", "direct", "albedo"), reversed(LOBES["Diffuse"]), strict=True))
-# `Noisy Image` is the picture before Blender's own denoiser, which `Combined` is after.
+# Names since Blender 5.0, then those up to 4.x. `Noisy Image` is the picture before Blender's own
+# denoiser, which `Combined` is after.
 BEAUTY = ("Noisy Image", "Combined")
+PASSES = {
+    "indirect": ("Diffuse Indirect", "DiffInd"),
+    "direct": ("Diffuse Direct", "DiffDir"),
+    "albedo": ("Diffuse Color", "DiffCol"),
+}
 WHOLE_PICTURE = {
     "beauty": BEAUTY,
     "emission": ("Emission", "Emit"),
@@ -30,6 +28,17 @@ WHOLE_PICTURE = {
     "seen_albedo": ("Denoising Albedo",),
     "seen_normal": ("Denoising Normal",),
 }
+# Of every lobe its colour, and the passes that are divided by it; volumes have no colour.
+LOBES = (
+    (("Diffuse Color", "DiffCol"), ("Diffuse Direct", "DiffDir"), ("Diffuse Indirect", "DiffInd")),
+    (("Glossy Color", "GlossCol"), ("Glossy Direct", "GlossDir"), ("Glossy Indirect", "GlossInd")),
+    (
+        ("Transmission Color", "TransCol"),
+        ("Transmission Direct", "TransDir"),
+        ("Transmission Indirect", "TransInd"),
+    ),
+    ((), ("Volume Direct", "VolumeDir"), ("Volume Indirect", "VolumeInd")),
+)
 GUIDES = {
     "normal": ("Normal", "Denoising Normal"),
     "depth": ("Depth", "Denoising Depth"),
@@ -50,8 +59,7 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
     views = _views(channels)
     if not views:
         return None
-    # The one with the most layers; the compositor's own `Composite` has none.
-    view = max(views, key=lambda view: len(_find(views[view], PASSES | GUIDES)))
+    view = max(views, key=lambda view: _usefulness(views[view]))
     light = _find(views[view], PASSES)
     if not {"indirect", "albedo"} <= set(light):
         light = _find(views[view], {"albedo": ("Denoising Albedo", *PASSES["albedo"])})
@@ -76,15 +84,13 @@ def layout(channels: Mapping[str, np.ndarray]) -> Layout | None:
 
 def _lobes(channels: Mapping[str, np.ndarray], view: str) -> Iterator[Lobe]:
     """The kinds of surfaces that have a colour and at least one pass."""
-    for lobe, layers in LOBES.items():
+    for layers in LOBES:
         colour, *passes = (
             next((c for name in names if len(c := in_layer(channels, _layer(view, name))) == 3), ())
             for names in layers
         )
-        if lobe == "Volume":
-            colour = ()
-        if (colour or lobe == "Volume") and any(passes):
-            yield Lobe(*(found or ("", "", "") for found in (colour, *passes)))
+        if (colour or not layers[0]) and any(passes):
+            yield Lobe(*(tuple(found) or ("", "", "") for found in (colour, *passes)))
 
 
 def _views(channels: Iterable[str]) -> dict[str, set[str]]:
@@ -94,6 +100,11 @@ def _views(channels: Iterable[str]) -> dict[str, set[str]]:
         view, _, name = layer.rpartition(".")
         views.setdefault(view, set()).add(name)
     return {view: passes for view, passes in views.items() if "Combined" in passes}
+
+
+def _usefulness(passes: set[str]) -> int:
+    """How many of the layers there are; the compositor's own `Composite` has none."""
+    return len(_find(passes, PASSES | GUIDES))
 
 
 def _find(passes: Iterable[str], wanted: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
