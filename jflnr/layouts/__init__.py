@@ -7,6 +7,6 @@ a Frame, so that nothing behind this package knows where a frame came from (docs
 from jflnr.layouts import native
 from jflnr.layouts.assemble import assemble
 from jflnr.layouts.channels import LAYERS, PICTURE, Layout, layer
-from jflnr.layouts.light import denoised
 from jflnr.layouts.output import CHOICES, output_channels, pass_names
 from jflnr.layouts.source import Source, is_picture, load, picture
+from jflnr.layouts.surface import denoised

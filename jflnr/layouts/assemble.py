@@ -8,9 +8,10 @@ import numpy as np
 from jflnr.camera import Camera, centres
 from jflnr.exr import Window
 from jflnr.layouts.channels import LAYERS, NATIVE, PICTURE, layer
-from jflnr.layouts.light import DARK, SKY, demodulate, rest
+from jflnr.layouts.light import DARK, demodulate, rest
 from jflnr.layouts.samples import samples_of
 from jflnr.layouts.source import Source
+from jflnr.layouts.surface import SKY
 
 # Arrays, or None for a layer that is absent.
 Layers = dict[str, Any]
